@@ -8,25 +8,70 @@ from collections.abc import Iterator
 from typing import Any
 
 from autograder import observe
+from autograder.observe.actions import ActionServerEnd, SentGoal
+from autograder.observe.choices import Choices, Question
+from autograder.observe.clock_bound_node import ClockBoundNode
+from autograder.observe.findings import in_context
 from autograder.observe.flat_rounds import require_flat, require_flat_lives
+from autograder.observe.graph import GraphService, GraphTopic, RosGraph
+from autograder.observe.graph_faults import find_link_faults
+from autograder.observe.graph_reader import GraphReader
+from autograder.observe.heartbeats import longest_silence, require_heartbeat
+from autograder.observe.late_joiner import hear_past
 from autograder.observe.lifecycle import LifecycleManager
 from autograder.observe.lifecycle_leaks import LifecycleLeaks
 from autograder.observe.lossless_listener import LosslessListener
+from autograder.observe.mark_trace import Trace
+from autograder.observe.mark_tracer import MarkTracer
+from autograder.observe.marked_goals import MarkedGoals
+from autograder.observe.merged_subscriptions import MergedSubscription
+from autograder.observe.multi_node_rig import Nodes, several_nodes
 from autograder.observe.node_graph import NodeGraph
 from autograder.observe.node_lives import NodeLives
-from autograder.observe.observed_node import Change
+from autograder.observe.observed_design import ObservedDesign, declared_nodes
+from autograder.observe.observed_goal import ObservedGoal
 from autograder.observe.observer import Observer
+from autograder.observe.plain_programs import ObservedProgram
 from autograder.observe.process_usage import ObservedProcess
 from autograder.observe.program_observer import ProgramObserver
-from autograder.observe.span import Span
+from autograder.observe.program_trials import Bounds, NodeTrials, served
+from autograder.observe.radio_link import open_radio
+from autograder.observe.relays.observed_relays import ObservedRelays, relays_of
+from autograder.observe.services import Request, ServiceServer
+from autograder.observe.stepped_goal import SteppedGoal
+from autograder.observe.stepped_observer import SteppedObserver
 from autograder.observe.stepped_rate import MessageCounter
+from autograder.observe.stepped_trials import SteppedTrials
+from autograder.observe.stream_rate import StreamRate, require_stream
 
-DESCRIBED: tuple[Any, ...] = (
-    observe.one_node, observe.Topic, observe.Service, observe.Action, observe.Parameter,
-    observe.ObservedNode, Span, Change,
-    Observer, NodeLives, NodeGraph, ObservedProcess, require_flat, require_flat_lives,
-    MessageCounter, LosslessListener, LifecycleManager, LifecycleLeaks, ProgramObserver,
-)  # fmt: skip
+DESCRIBED: dict[str, tuple[Any, ...]] = {
+    "One node": (
+        observe.one_node, observe.Topic, observe.Service, observe.Action, observe.Parameter,
+        observe.ObservedNode, observe.Span, observe.Change,
+    ),
+    "Several nodes, one at a time, and the servers that they call": (
+        several_nodes, Nodes, observe.Task, ClockBoundNode, ServiceServer, Request,
+        ActionServerEnd, ObservedGoal, SentGoal, require_heartbeat, longest_silence,
+    ),
+    "The ROS graph, and what travels over it": (
+        declared_nodes, ObservedDesign, RosGraph, GraphTopic, GraphService, GraphReader,
+        find_link_faults, MarkTracer, MarkedGoals, Trace,
+    ),
+    "Nodes that hand on what they receive": (relays_of, ObservedRelays, hear_past, open_radio),
+    "Plain programs, and what a process holds": (
+        ObservedProgram, NodeTrials, Bounds, served, ProgramObserver, ObservedProcess,
+        require_flat, require_flat_lives,
+    ),
+    "Lives and states of a node": (
+        Observer, NodeLives, NodeGraph, MessageCounter, LosslessListener, LifecycleManager,
+        LifecycleLeaks,
+    ),
+    "Streams and goals, step by step": (
+        SteppedObserver, SteppedGoal, MergedSubscription, require_stream, StreamRate,
+        SteppedTrials,
+    ),
+    "What a student chose, and findings": (Choices, Question, in_context),
+}  # fmt: skip
 
 
 def reference() -> str:
@@ -38,14 +83,22 @@ def _lines() -> Iterator[str]:
     yield "# What an exam looks and provokes with"
     yield ""
     yield "Made by `python -m autograder.observe` from the docstrings; a test keeps it in step."
-    for described in DESCRIBED:
-        yield from _section(described, 2, described.__name__)
-        if inspect.isclass(described):
-            for name, member in vars(described).items():
-                if not name.startswith("_") and inspect.getdoc(member):
-                    function = member.fget if isinstance(member, property) else member
-                    if inspect.isfunction(function) and function.__name__ == name:
-                        yield from _section(function, 3, name, is_property=function is not member)
+    for title, nouns in DESCRIBED.items():
+        yield from ("", f"## {title}")
+        for described in nouns:
+            yield ""
+            yield f"From `{described.__module__}`:"
+            yield from _section(described, 3, described.__name__)
+            if inspect.isclass(described):
+                yield from _members(described)
+
+
+def _members(described: type) -> Iterator[str]:
+    for name, member in vars(described).items():
+        if not name.startswith("_") and inspect.getdoc(member):
+            function = member.fget if isinstance(member, property) else member
+            if inspect.isfunction(function) and function.__name__ == name:
+                yield from _section(function, 4, name, is_property=function is not member)
 
 
 def _section(described: Any, level: int, name: str, *, is_property: bool = False) -> Iterator[str]:
@@ -53,9 +106,6 @@ def _section(described: Any, level: int, name: str, *, is_property: bool = False
     yield ""
     yield f"{'#' * level} `{name}{signature}`"
     yield ""
-    if level == 2 and not hasattr(observe, name):
-        yield f"`from {described.__module__} import {name}`"
-        yield ""
     yield "```text"
     yield from (inspect.getdoc(described) or "").splitlines()
     yield "```"

@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.executors import Executor
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.task import Future
 
-from autograder.observe.nouns import Service, Topic
+from autograder.observe.actions import ActionClientEnd
+from autograder.observe.nouns import Action, Service, Task, Topic
 from autograder.observe.participants import of_others
 from autograder.observe.qos_refusal import find_refusal
 from autograder.observe.quiet_node import QuietNode
+from autograder.observe.services import Request, hold_requests
 
 # What is offered meets every demand but that of a deadline, so a student's QoS is free.
 OFFERED = QoSProfile(
@@ -31,30 +30,6 @@ class Heard:
     value: Any
 
 
-class Request:
-    """A request that the student's node has sent to a service which the examiner plays.
-
-    Attributes:
-        at_s: when it came, in s of the node's time.
-        message: the request itself.
-    """
-
-    def __init__(self, at_s: float, message: Any, response: Any, executor: Executor) -> None:
-        """Wait for `answer`."""
-        self.at_s, self.message, self._response = at_s, message, response
-        self._executor = executor
-        self.answered = Future(executor=executor)
-
-    def answer(self, **fields: Any) -> None:
-        """Send the answer, with these fields; only the first one counts."""
-        if self.answered.done():
-            return
-        for name, value in fields.items():
-            setattr(self._response, name, value)
-        self.answered.set_result(self._response)
-        self._executor.wake()
-
-
 class ExaminerEnd(QuietNode):
     """A node of the examiner's with an end for each topic of a task.
 
@@ -66,10 +41,11 @@ class ExaminerEnd(QuietNode):
         """Create no endpoints yet."""
         super().__init__("examiner")
         self.now_s = 0.0
-        self._heard: dict[str, list[Heard]] = {}
+        self._heard: dict[str, list[tuple[float, Any]]] = {}  # when, and the message
         self._listening: dict[str, Any] = {}
         self._telling: dict[str, Any] = {}
         self._asking: dict[str, Any] = {}
+        self._goals: dict[str, ActionClientEnd] = {}
         self._requests: dict[str, list[Request]] = {}
 
     def listen(self, topic: Topic) -> None:
@@ -87,13 +63,23 @@ class ExaminerEnd(QuietNode):
         heard = self._heard.setdefault(topic.name, [])
 
         def note(message: Any) -> None:
-            heard.append(Heard(self.now_s, topic.value(message)))
+            heard.append((self.now_s, message))
 
         self._listening[topic.name] = self.create_subscription(topic.type, str(topic), note, wanted)
 
     def heard(self, topic: Topic) -> list[Heard]:
         """Return what came on a topic so far."""
-        return list(self._heard.get(topic.name, ()))
+        return [
+            Heard(at_s, topic.value(message)) for at_s, message in self._heard.get(topic.name, ())
+        ]
+
+    def values(self, topic: Topic) -> list[Any]:
+        """Return what came on a topic so far, as `Topic.value` has it."""
+        return [heard.value for heard in self.heard(topic)]
+
+    def clear(self, topic: Topic) -> None:
+        """Forget what came on a topic so far."""
+        self._heard.get(topic.name, []).clear()
 
     def forget(self) -> None:
         """Forget what came so far, and answer what waits: it was another node's."""
@@ -114,16 +100,7 @@ class ExaminerEnd(QuietNode):
         if service.name in self._requests:
             return
         requests = self._requests.setdefault(service.name, [])
-
-        async def respond(message: Any, response: Any) -> Any:
-            executor = self.executor
-            assert isinstance(executor, Executor)
-            request = Request(self.now_s, message, response, executor)
-            requests.append(request)
-            return await request.answered
-
-        group = ReentrantCallbackGroup()
-        self.create_service(service.type, str(service), respond, callback_group=group)
+        hold_requests(self, service, requests, lambda: self.now_s)
 
     def requests(self, service: Service) -> list[Request]:
         """Return the requests that came to a service which the examiner plays."""
@@ -135,11 +112,53 @@ class ExaminerEnd(QuietNode):
             self._telling[topic.name] = self.create_publisher(topic.type, str(topic), OFFERED)
         return self._telling[topic.name]
 
+    def connect(self, served: Service | Action) -> None:
+        """Create the examiner's client of a service or an action."""
+        if isinstance(served, Action):
+            self.action_client(served)
+        else:
+            self.client_of(str(served), served.type)
+
+    def is_served(self, served: Service | Action) -> bool:
+        """Return whether the examiner's client has found a server of a service or an action."""
+        if isinstance(served, Action):
+            return self.action_client(served).is_ready()
+        return bool(self.client_of(str(served), served.type).service_is_ready())
+
+    def action_client(self, action: Action) -> ActionClientEnd:
+        """Return the examiner's client of an action; it is there from the first call on."""
+        if action.name not in self._goals:
+            self._goals[action.name] = ActionClientEnd(self, action, lambda: self.now_s)
+        return self._goals[action.name]
+
+    def destroy_node(self) -> None:
+        """Destroy it with its action clients, which rclpy leaves alive."""
+        for client in self._goals.values():
+            client.destroy()
+        super().destroy_node()
+
     def client_of(self, name: str, service_type: Any) -> Any:
         """Return the examiner's client of a service; it is there from the first call on."""
         if name not in self._asking:
             self._asking[name] = self.create_client(service_type, name)
         return self._asking[name]
+
+    def missing(self, task: Task) -> list[str]:
+        """Return which endpoints of a task's node are not on the graph, a phrase each."""
+        return [f"no {what}" for what, is_there in self.find_ends(task) if not is_there]
+
+    def find_ends(self, task: Task) -> list[tuple[str, bool]]:
+        """Return each endpoint of a task's node, in words, and whether it is on the graph."""
+        publishers = self.get_publishers_info_by_topic
+        subscriptions = self.get_subscriptions_info_by_topic
+        clients = [*task.calls, *task.uses]
+        return [
+            *((f"publisher on {t}", bool(of_others(publishers(str(t))))) for t in task.publishes),
+            *((f"subscription to {t}", bool(of_others(subscriptions(str(t)))))
+              for t in task.subscribes),
+            *((f"{s.kind} {s}", all(map(self.count_services, s.services))) for s in task.serves),
+            *((f"client of {s}", all(map(self.count_clients, s.services))) for s in clients),
+        ]  # fmt: skip
 
     def unserved(self, topic: Topic) -> str:
         """Return why a subscription of others on a topic hears nothing; empty if one does."""

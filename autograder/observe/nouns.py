@@ -12,9 +12,9 @@ Example:
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 
 def whole_message(message: Any) -> Any:
@@ -47,6 +47,12 @@ class Service:
 
     name: str
     type: Any
+    kind: ClassVar[str] = "service"
+
+    @property
+    def services(self) -> list[str]:
+        """The full names of the services that it is made of: its own."""
+        return [str(self)]
 
     def __str__(self) -> str:
         """Return its full name, as the graph has it."""
@@ -55,10 +61,22 @@ class Service:
 
 @dataclass(frozen=True)
 class Action:
-    """An action of the task: its name, and its type, such as ``Fibonacci``."""
+    """An action of the task: its name, and its type, such as ``Fibonacci``.
+
+    Example:
+        >>> from test_msgs.action import Fibonacci
+        >>> Action("drive", Fibonacci).services[0]
+        '/drive/_action/send_goal'
+    """
 
     name: str
     type: Any
+    kind: ClassVar[str] = "action"
+
+    @property
+    def services(self) -> list[str]:
+        """The full names of the services that it is made of (ROS 2 design, "Actions")."""
+        return [f"{self}/_action/{part}" for part in ("send_goal", "cancel_goal", "get_result")]
 
     def __str__(self) -> str:
         """Return its full name, as the graph has it."""
@@ -80,6 +98,31 @@ class Parameter:
     def __str__(self) -> str:
         """Return its name."""
         return self.name
+
+
+@dataclass(frozen=True)
+class Task:
+    """What the node of a task is connected to.
+
+    Attributes:
+        node: the name of its class in the notebook.
+        publishes: topics that it publishes on.
+        subscribes: topics that it listens to.
+        serves: its services and actions.
+        calls: services that it is a client of, which the examiner plays.
+        uses: services and actions that it is a client of, whose servers come and go.
+        parameters: those that it declares.
+        threads: how many run its callbacks.
+    """
+
+    node: str
+    publishes: Sequence[Topic] = ()
+    subscribes: Sequence[Topic] = ()
+    serves: Sequence[Service | Action] = ()
+    calls: Sequence[Service] = ()
+    uses: Sequence[Service | Action] = ()
+    parameters: Sequence[Parameter] = ()
+    threads: int = 1
 
 
 def _full_name(name: str) -> str:

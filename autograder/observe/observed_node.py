@@ -19,42 +19,19 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.parameter import parameter_value_to_python
 
-from autograder.examination.check_context import CheckContext, StudentError
+from autograder.examination.check_context import CheckContext, Endpoints, StudentError
 from autograder.examination.exam import Failed
-from autograder.observe.examiner_end import ExaminerEnd, Request
-from autograder.observe.nouns import Parameter, Service, Topic
-from autograder.observe.participants import of_others
+from autograder.observe.examiner_end import ExaminerEnd
+from autograder.observe.nouns import Parameter, Service, Task, Topic
 from autograder.observe.patience import Patience
-from autograder.observe.phrases import with_reason
+from autograder.observe.phrases import say_words, with_reason
+from autograder.observe.services import Request
 from autograder.observe.span import PACES, Span
 from autograder.observe.stillness import Stillness
 from course.errors import WaitTimeout
 
 STRIDE_S = 0.1
 """Seconds of the node's time between two looks at what came."""
-
-
-@dataclass(frozen=True)
-class Task:
-    """What the node of a task is connected to.
-
-    Attributes:
-        node: the name of its class in the notebook.
-        publishes: topics that it publishes on.
-        subscribes: topics that it listens to.
-        serves: its services.
-        calls: services that it is a client of, which the examiner plays.
-        parameters: those that it declares.
-        threads: how many run its callbacks.
-    """
-
-    node: str
-    publishes: Sequence[Topic] = ()
-    subscribes: Sequence[Topic] = ()
-    serves: Sequence[Service] = ()
-    calls: Sequence[Service] = ()
-    parameters: Sequence[Parameter] = ()
-    threads: int = 1
 
 
 @dataclass(frozen=True)
@@ -106,6 +83,7 @@ class ObservedNode:
 
     Attributes:
         draws: the numbers of this examination, which nobody can know beforehand.
+        end: the examiner's end of its topics, services and actions.
     """
 
     def __init__(self, bench: CheckContext, task: Task, end: ExaminerEnd, still: Stillness) -> None:
@@ -115,7 +93,7 @@ class ObservedNode:
             StudentError: its class is missing, or its constructor raised.
         """
         self.draws = bench.draws
-        self._bench, self._task, self._end, self._still = bench, task, end, still
+        self._bench, self._task, self.end, self._still = bench, task, end, still
         self._raised = frozenset(bench.subject.errors())
         self._looked_at = Counter[str]()  # messages of each topic that were in a span
         self._answers: dict[Service, tuple[float, dict[str, Any]]] = {}
@@ -128,8 +106,8 @@ class ObservedNode:
                 end.listen(topic)
             for topic in task.subscribes:
                 end.publisher(topic)
-            for service in task.serves:
-                end.client_of(str(service), service.type)
+            for served in task.serves:
+                end.connect(served)
             self._await_discovery()
         self.rest()
 
@@ -147,7 +125,7 @@ class ObservedNode:
                 expected=expected, actual=f"There is {', '.join(missing)}.{self.error_note()}"
             )
         for topic in self._task.subscribes:
-            if why := self._end.unserved(topic):
+            if why := self.end.unserved(topic):
                 raise Failed(expected=expected, actual=why)
         for parameter in self._task.parameters:
             if self.get(parameter) is None:
@@ -156,47 +134,34 @@ class ObservedNode:
                 )
 
     def _missing(self) -> list[str]:
-        return [f"no {what}" for what, is_there in self._ends() if not is_there]
-
-    def _ends(self) -> list[tuple[str, bool]]:
-        """Return each end that the task wants, in words, and whether it is on the graph."""
-        task, end = self._task, self._end
-        publishers, subscriptions = (
-            end.get_publishers_info_by_topic,
-            end.get_subscriptions_info_by_topic,
-        )
-        return [
-            *((f"publisher on {t}", bool(of_others(publishers(str(t))))) for t in task.publishes),
-            *(
-                (f"subscription to {t}", bool(of_others(subscriptions(str(t)))))
-                for t in task.subscribes
-            ),
-            *((f"service {s}", bool(end.count_services(str(s)))) for s in task.serves),
-            *((f"client of {s}", bool(end.count_clients(str(s)))) for s in task.calls),
-        ]
+        return self.end.missing(self._task)
 
     def _await_discovery(self) -> None:
         endpoints = {
             "publishers": [str(topic) for topic in self._task.subscribes],
             "subscribers": [str(topic) for topic in self._task.publishes],
-            "clients": [str(service) for service in self._task.serves],
+            "clients": [name for served in self._task.serves for name in served.services],
             "services": [str(service) for service in self._task.calls],
         }
+        self._await_seen(endpoints)
+        for served in self._task.serves:
+            self.wait(partial(self.end.is_served, served))
+
+    def _await_seen(self, endpoints: Endpoints, *, there: bool = True) -> None:
+        """Wait until the node has discovered each endpoint, or the loss of each."""
 
         def all_seen() -> bool:
             counts = self._bench.subject.sees(self._task.node, endpoints)
-            return all(number for kind in counts.values() for number in kind.values())
+            return all(bool(n) is there for kind in counts.values() for n in kind.values())
 
         self.wait(all_seen)
-        for service in self._task.serves:
-            self.wait(self._end.client_of(str(service), service.type).service_is_ready)
 
     # Time.
 
     @property
     def now_s(self) -> float:
         """The node's time in s."""
-        return self._end.now_s
+        return self.end.now_s
 
     def advance(
         self, seconds: float, when: str = "", *, once: bool = False, stride_s: float = STRIDE_S
@@ -219,18 +184,14 @@ class ObservedNode:
         self, seconds: float, when: str, stride_s: float, pace: float, *, once: bool = False
     ) -> Span:
         topics = self._task.publishes
-        begin = self._end.now_s
+        begin = self.end.now_s
         strides = max(1, math.ceil(seconds / stride_s - 1e-9))
         for _ in range(strides):
-            self._end.now_s += seconds / strides  # before: what comes bears the stride's end
-            self._advance_by(seconds / strides)
-            self.rest()
-            if self._answer_what_is_due():
-                self.rest()
+            self._stride(seconds / strides)
             if pace:
                 self._let_wall_time_pass(pace * seconds / strides)
         came = {
-            topic.name: self._end.heard(topic)[self._looked_at[topic.name] :] for topic in topics
+            topic.name: self.end.heard(topic)[self._looked_at[topic.name] :] for topic in topics
         }
         self._looked_at.update({topic.name: len(came[topic.name]) for topic in topics})
         seen = ", ".join(
@@ -239,14 +200,55 @@ class ObservedNode:
         slowly = f" at {pace:g} s of wall time a second" if pace else ""
         self._bench.note_step(f"{seconds:g} s pass{slowly}: {seen or 'nothing is listened to'}")
         return Span(
-            when, begin, self._end.now_s, seconds / strides, came,
+            when, begin, self.end.now_s, seconds / strides, came,
             None if once else partial(self._pass, seconds, when, min(stride_s, STRIDE_S) / 2),
             self.error_note, self._stands_still,
         )  # fmt: skip
 
-    def _advance_by(self, seconds: float) -> None:
+    def advance_until(
+        self, condition: Callable[[], Any], seconds: float, *, stride_s: float = STRIDE_S
+    ) -> bool:
+        """Let the node's time pass until a condition holds, and return whether it does.
+
+        Args:
+            condition: looked at before each stride, when both sides are at rest.
+            seconds: of the node's time that may pass, at most.
+            stride_s: seconds between two looks; coarser ones where it does not matter when exactly
+                something happens.
+
+        Raises:
+            Failed: a callback held up the node for so long that its clock stood still.
+        """
+        began_s = self.now_s
+        end_s = began_s + seconds
+        self.rest()
+        while not (holds := bool(condition())) and self.now_s < end_s - STRIDE_S / 2:
+            self._stride(min(stride_s, end_s - self.now_s))
+        self._bench.note_step(f"{self.now_s - began_s:.3g} of {seconds:.3g} s pass: {self._seen()}")
+        return holds
+
+    def _seen(self) -> str:
+        """Return what has come and was not forgotten, for the author of the exam."""
+        heard = {topic: self.end.values(topic) for topic in self._task.publishes}
+        return ", ".join(f"{topic}: {_abridged(came)}" for topic, came in heard.items() if came)
+
+    def _stride(self, seconds: float) -> None:
+        self.end.now_s += seconds  # before: what comes on the way bears the stride's end
+        self._advance_by(seconds)
+        self.rest()
+        if self._answer_what_is_due():
+            self.rest()
+
+    def forget(self, *topics: Topic) -> None:
+        """Forget what has come on topics so far, so that it answers nothing that comes now."""
+        for topic in topics:
+            self.end.clear(topic)
+            self._looked_at[topic.name] = 0
+
+    def _advance_by(self, seconds: float) -> bool:
+        """Move the node's time on; return whether some callback has begun, and not ended by now."""
         try:
-            self._bench.subject.advance(seconds)
+            return self._bench.subject.advance(seconds)
         except StudentError:
             waits = self._bench.subject.wall_waits()
             where = f" One waits in {waits[0].rstrip('.')}." if waits else ""
@@ -270,14 +272,14 @@ class ObservedNode:
 
     def requests(self, service: Service) -> list[Request]:
         """Return the requests that the node has sent to a service which the examiner plays."""
-        return self._end.requests(service)
+        return self.end.requests(service)
 
     def _answer_what_is_due(self) -> bool:
         due = [
             (request, fields)
             for service, (seconds, fields) in self._answers.items()
-            for request in self._end.requests(service)
-            if not request.answered.done() and self._end.now_s >= request.at_s + seconds - 1e-9
+            for request in self.end.requests(service)
+            if not request.answered.done() and self.end.now_s >= request.at_s + seconds - 1e-9
         ]
         for request, fields in due:
             request.answer(**fields)
@@ -290,10 +292,10 @@ class ObservedNode:
     def _stands_still(self, topic: Topic, seconds: float) -> bool:
         """Return whether nothing comes on a topic while the node's time stands still."""
         self.rest()
-        before = len(self._end.heard(topic))
+        before = len(self.end.heard(topic))
         with suppress(WaitTimeout):
             self._bench.session.until(
-                lambda: len(self._end.heard(topic)) > before, timeout=seconds, what="a message"
+                lambda: len(self.end.heard(topic)) > before, timeout=seconds, what="a message"
             )
             return False
         return True
@@ -393,6 +395,30 @@ class ObservedNode:
         self._bench.note_step(f"{service} called with {fields}: {reply}")
         return reply
 
+    def call_within(
+        self, service: Service, seconds: float, *, expected: str = "", **fields: Any
+    ) -> Any:
+        """Call a service of the node's, let time pass until it answers, and return the answer.
+
+        Args:
+            service: one that it serves.
+            seconds: of the node's time that it has, as its callback may wait for something.
+            expected: what is needed, a sentence, if that is more than an answer.
+            fields: those of the request.
+
+        Raises:
+            Failed: no answer comes in time.
+        """
+        request = service.type.Request(**fields)
+        future = self.end.client_of(str(service), service.type).call_async(request)
+        self.require_that(
+            self.advance_until(future.done, seconds),
+            expected or f"{service} answers within {seconds:g} s.",
+            "No answer came.",
+        )
+        self.rest()
+        return future.result()
+
     def require_success(self, service: Service, **fields: Any) -> Any:
         """Call a service whose answer says whether it succeeded, and require that it did.
 
@@ -416,7 +442,7 @@ class ObservedNode:
         return self._call(f"{self._name}/{what}", service_type, request)
 
     def _call(self, name: str, service_type: Any, request: Any) -> Any:
-        client = self._end.client_of(name, service_type)
+        client = self.end.client_of(name, service_type)
         expected = f"The service {name} answers, also while the node has other work."
         if not self.wait(client.service_is_ready):
             raise Failed(expected=expected, actual=f"There is no service {name}.")
@@ -429,7 +455,7 @@ class ObservedNode:
 
     def send(self, topic: Topic, message: Any) -> None:
         """Publish a message on a topic that the node listens to, and let it deal with it."""
-        self._end.publisher(topic).publish(message)
+        self.end.publisher(topic).publish(message)
         self.rest()
 
     # Its end, and its errors.
@@ -450,12 +476,45 @@ class ObservedNode:
         Raises:
             Failed: one is.
         """
-        self.wait(lambda: not any(is_there for _, is_there in self._ends()))
-        if left := [f"a {what}" for what, is_there in self._ends() if is_there]:
+        self.wait(lambda: not any(is_there for _, is_there in self.end.find_ends(self._task)))
+        if left := [f"a {what}" for what, is_there in self.end.find_ends(self._task) if is_there]:
             raise Failed(
                 expected="After `destroy_node()` nothing of the node is left on the graph.",
                 actual=f"There still is {', '.join(left)}.",
             )
+
+    def require_that(self, holds: Any, expected: str, actual: str) -> None:
+        """Require what the exam has observed by itself; an error of a callback's is told, too.
+
+        Args:
+            holds: whether it is as needed.
+            expected: what was needed, a sentence.
+            actual: what was seen instead, a sentence.
+
+        Raises:
+            Failed: it is not.
+        """
+        if not holds:
+            raise Failed(expected=expected, actual=actual + self.error_note())
+
+    def require_word(self, topic: Topic, word: str, within_s: float, when: str) -> None:
+        """Require that one word comes on a topic since it was forgotten, and no other.
+
+        Args:
+            topic: one whose value is a text.
+            word: what it says.
+            within_s: seconds of the node's time that it may take.
+            when: what it is about, to begin a sentence with.
+
+        Raises:
+            Failed: nothing comes in time, or something else has come, too.
+        """
+        self.advance_until(lambda: self.end.values(topic), within_s)
+        came = self.end.values(topic)
+        nothing = f"Within {within_s:.3g} s it said nothing."
+        self.require_that(
+            came == [word], f"{when}, {topic} says “{word}”, once.", say_words(came, nothing)
+        )
 
     def error_note(self) -> str:
         """Return what a callback raised since the node was made, as a sentence to add."""
@@ -519,7 +578,7 @@ def one_node(
         >>> from autograder.examination.exam import Exam
         >>> exam = Exam("talker", one_node("Talker", publishes=[Topic("chatter", String)]))
     """
-    task = Task(node, publishes, subscribes, serves, calls, parameters, threads)
+    task = Task(node, publishes, subscribes, serves, calls, parameters=parameters, threads=threads)
 
     @contextmanager
     def stage(bench: CheckContext) -> Iterator[Stage]:

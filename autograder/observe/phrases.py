@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 ABORTED = (
     "by a call of abort(), or because the execute callback raised, or returned without succeed() "
@@ -31,6 +31,27 @@ def who_does(names: Iterable[str], verb: str) -> str:
 def pictures_phrase(number: int) -> str:
     """Return a number of pictures as a phrase: "one picture", "3 pictures"."""
     return "one picture" if number == 1 else f"{number} pictures"
+
+
+def there_were(number: int, one: str, several: str) -> str:
+    """Return how many of something there were, as a clause.
+
+    Example:
+        >>> there_were(1, "try", "tries"), there_were(0, "try", "tries")
+        ('there was 1 try', 'there were no tries')
+    """
+    return f"there was 1 {one}" if number == 1 else f"there were {number or 'no'} {several}"
+
+
+def say_words(words: Sequence[object], nothing: str = "It said nothing.") -> str:
+    """Return which words were said, one after the other, as a sentence.
+
+    Example:
+        >>> say_words(["lost", "arrived"])
+        'It said “lost”, then “arrived”.'
+    """
+    said = ", then ".join(f"“{word}”" for word in words)
+    return f"It said {said}." if said else nothing
 
 
 def with_reason(reason: str) -> str:

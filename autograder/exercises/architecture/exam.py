@@ -27,7 +27,8 @@ from autograder.exercises.architecture.robot_jobs import (
     WHEELS,
     Jobs,
 )
-from autograder.observe import GraphTopic, RosGraph, find_link_faults
+from autograder.observe.graph import GraphTopic, RosGraph
+from autograder.observe.graph_faults import find_link_faults
 from autograder.observe.mark_trace import Trace
 from autograder.observe.marked_types import is_installed
 from autograder.observe.observed_design import ObservedDesign, declared_nodes

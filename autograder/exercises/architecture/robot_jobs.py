@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from functools import cached_property
 
-from autograder.observe import GraphService, GraphTopic, RosGraph
+from autograder.observe.graph import GraphService, GraphTopic, RosGraph
 from autograder.observe.marked_types import bears_marks
 
 

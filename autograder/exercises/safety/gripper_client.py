@@ -1,278 +1,277 @@
-"""Part A, the gripper's client: answers, refusals, silence, no gripper."""
+"""Part A, the gripper's client: one request for a grip, its tries, and its outcome."""
 
 from __future__ import annotations
 
-import time
-from contextlib import suppress
+from functools import partial
 
-from autograder.examination.exam import Failed
-from autograder.exercises.safety import heartbeat, plain_program_times
-from autograder.exercises.safety.grip_request import (
-    ALLOWED,
-    DEADLINE,
-    LONGEST,
-    PROMPT,
-    TOLERANCE,
-    describe_outcomes,
-    request_grip,
-    require_data,
-    require_once,
-    require_outcome,
-    run_client,
-)
-from autograder.exercises.safety.gripper import GripUser
-from autograder.exercises.safety.node_under_test import COARSE, STRIDE, Robot, WallWait
-from autograder.exercises.safety.rig import RobotRig
+from std_msgs.msg import Bool, Empty, String
+from std_srvs.srv import SetBool
 
-SLOW = 0.7  # s that an answer takes which is slow, but in time whatever the tolerance
-APART = 0.5  # s from one try to another's, whose answer takes so long that the first's 1 s is over
-ANSWER = 1.0  # s after which a try without an answer has failed
-FIRST_GAP = 1.5  # s between the first two tries: 1 s without an answer, 0.5 s of pause
-GROWTH = 0.5  # s by which the second pause is longer, at least
-IDLE = 2.0  # s in which a node that has not been asked for anything shows its heartbeat
-HELD_S = 1.0  # s of wall time for which the node's clock stands still in the first pause
-BACK = 1.8  # s after a request in which the gripper comes back: a third try is still to come
+from autograder.observe import Service, Task, Topic
+from autograder.observe.clock_bound_node import ClockBoundNode
+from autograder.observe.heartbeats import require_heartbeat
+from autograder.observe.observed_node import STRIDE_S
+from autograder.observe.phrases import capitalize_first, say_words, there_were
+from autograder.observe.plain_programs import Clocked
+from autograder.observe.services import Request, ServiceServer
+
+REQUEST = Topic("grip/request", Bool)
+OUTCOME = Topic("grip/outcome", String, value=lambda message: message.data)
+HOLD = Topic("arm/hold", Empty)
+HEARTBEAT = Topic("grip/heartbeat", Empty)
+GRIPPER = Service("gripper/set", SetBool)
+GRIPPER_CLIENT = Task(
+    "GripperClient", publishes=[OUTCOME, HOLD, HEARTBEAT], subscribes=[REQUEST], uses=[GRIPPER],
+    threads=4,
+)  # fmt: skip
+
+PROMPT_S = 1.0  # for an outcome that is clear; a node may look for it by a timer
+LONGEST_S = 10.0  # from a request to its outcome
+ALLOWED_S = 0.2  # more or less, which does no harm
+TOLERANCE_S = ALLOWED_S + STRIDE_S / 2  # what the task allows, and what the strides blur
+DEADLINE_S = LONGEST_S + TOLERANCE_S + STRIDE_S  # after which no outcome is due any more
+AFTER_S = 1.5  # in which a second outcome would show
+COARSE_S = 0.5  # between two looks where it does not matter when exactly something happens
+ANSWER_S = 1.0  # after which a try has failed
+PAUSE_S = 0.5  # from then to the second try, at least, and by which the next pause is longer
+SHORTEST_S = 4.5 - 5 * ALLOWED_S - STRIDE_S  # three tries and two pauses, as short as may be
+HELD_S = 1.0  # of wall time for which the node's clock stands still in the first pause
+BEAT_S = 0.5  # between two heartbeats
 GIVEN_UP = "After three tries without an answer"
-SECOND = " That was at the second request in a row that got no answer; at the first all was right."
-LEFT = (
-    f" The try for the request before, {APART:g} s earlier, had been answered at once: is its "
-    "time-out called off then?"
-)
-SHORTEST = 4.5 - 5 * ALLOWED - STRIDE  # s: three tries and two pauses, each as short as may be
+require_beats = partial(require_heartbeat, topic=HEARTBEAT, period_s=BEAT_S, allowed_s=ALLOWED_S)
+SECOND_TRY = "After a try without an answer there is a second one."
 
 
-def carried_out(rig: RobotRig) -> None:
-    """The gripper answers, at once and within the time of a try."""
-    with run_client(rig) as (robot, user):
-        close = robot.draws.flag("the grip that is carried out")
-        _carries_out(robot, user, close, 0.0)
-        require_once(robot, user, _carries_out(robot, user, not close, SLOW))
-    rig.require_times_unasked(GripUser.CLIENT, plain_program_times.SLOW)
+class Grip:
+    """One request for a grip, and what has become of it; what was before is forgotten.
 
-
-def _carries_out(robot: Robot, user: GripUser, close: bool, delay: float, aside: str = "") -> str:
-    """Answer a first try with success after ``delay`` s, and require that it counts.
-
-    ``aside`` is a sentence to add if the gripper was called again. Returns what happened in words,
-    as the beginning of a sentence.
+    Attributes:
+        gripper: the server that is asked, if there is one.
+        close: what was requested.
+        began_s: when, in s of the node's time.
     """
-    request_grip(robot, user, close)
-    robot.spend_time(delay)
-    if not user.outcomes:
-        user.tries[0].reply(True)
-    robot.run(lambda: user.outcomes or len(user.tries) > 1, PROMPT)
-    if len(user.tries) > 1:
-        raise Failed(
-            expected=f"An answer after {delay:g} s is in time: one try is enough.",
-            actual=f"The gripper was called {len(user.tries)} times.{aside}",
+
+    def __init__(self, node: Clocked, gripper: ServiceServer | None, close: bool) -> None:
+        """Ask for it."""
+        self.gripper, self.close, self.began_s = gripper, close, node.now_s
+        self._end, self._first_try = node.end, len(gripper.requests) if gripper else 0
+        before = node.end.values(OUTCOME)
+        self.follows = f", the next one after “{before[-1]}”" if before else ""
+        node.forget(OUTCOME, HOLD)
+        node.end.publisher(REQUEST).publish(Bool(data=close))
+
+    @property
+    def tries(self) -> list[Request]:
+        """The calls of the gripper so far."""
+        return self.gripper.requests[self._first_try :] if self.gripper else []
+
+    @property
+    def outcomes(self) -> list[str]:
+        """What was published on grip/outcome so far."""
+        return self._end.values(OUTCOME)
+
+    def has_begun(self) -> bool:
+        """Return whether the gripper has been called."""
+        return bool(self.tries)
+
+    def is_over(self) -> bool:
+        """Return whether there is an outcome."""
+        return bool(self.outcomes)
+
+    def has_gone_on(self, tries: int = 1) -> bool:
+        """Return whether there are more tries than these, or an outcome."""
+        return len(self.tries) > tries or self.is_over()
+
+
+class ExaminedGrip(Grip):
+    """A request for a grip in a session, of which the task says what has to become."""
+
+    def __init__(self, node: ClockBoundNode, gripper: ServiceServer | None, close: bool) -> None:
+        """Ask for it, and require that the gripper is called, if there is one."""
+        super().__init__(node, gripper, close)
+        self._node, self._when = node, ""
+        if gripper is not None:
+            data = str(close).lower()
+            node.require_that(
+                node.advance_until(self.has_begun, PROMPT_S),
+                f"After grip/request {data}{self.follows}, gripper/set is called.",
+                f"Within {PROMPT_S:g} s the gripper was not called. {say_words(self.outcomes)}",
+            )
+            self.require_data()
+
+    def require_data(self) -> None:
+        """Require that every try so far asks for what was requested."""
+        for number, attempt in enumerate(self.tries, 1):
+            which = f" in try {number}" if number > 1 else ""
+            self._node.require_that(
+                attempt.message.data is self.close,
+                f"The gripper is called with data={str(self.close).lower()}, as requested.",
+                f"It was called with data={str(attempt.message.data).lower()}{which}.",
+            )
+
+    def require_outcome(self, when: str, word: str, limit_s: float = PROMPT_S) -> None:
+        """Require one outcome, and a held arm unless it is good; ``when`` begins a sentence."""
+        self._when = when
+        self._node.require_word(OUTCOME, word, limit_s, when)
+        self._node.require_that(
+            word == "done" or self._node.advance_until(lambda: self._end.values(HOLD), PROMPT_S),
+            f"With “{word}” the arm is told to hold still, on arm/hold.",
+            f"It said “{word}”, and within {PROMPT_S:g} s nothing came on arm/hold.",
         )
-    when = f"When the gripper answered success=True after {delay:g} s"
-    require_outcome(robot, user, when, "done")
-    return when
 
-
-def examine_refusals(rig: RobotRig) -> None:
-    """The gripper answers that it will not: to the first try, and to the second."""
-    with run_client(rig) as (robot, user):
-        for grip in range(robot.draws.whole("grips before a refusal", 0, 0, 2)):
-            _carries_out(robot, user, robot.draws.flag(f"grip {grip} before a refusal"), 0.0)
-        close = robot.draws.flag("the grip that is refused")
-        request_grip(robot, user, close)
-        _require_refusal(robot, user, "When the gripper answered success=False")
-        request_grip(robot, user, not close)
-        with suppress(WallWait):
-            robot.run(lambda: len(user.tries) > 1 or user.outcomes, LONGEST, COARSE)
-        tries_again = len(user.tries) > 1
-        if tries_again:
-            when = "When the gripper answered not the first try, but the second with success=False"
-            _require_refusal(robot, user, when)
-        robot.require_no_errors("refused")
-    if not tries_again:  # that is another check's, and what is still under way must not be
-        rig.begin_anew()
-
-
-def _require_refusal(robot: Robot, user: GripUser, when: str) -> None:
-    """Refuse the try that is under way, and require that it is the last."""
-    user.holds = 0  # one that came with the request says nothing about the outcome
-    tries = len(user.tries)
-    user.tries[-1].reply(False)
-    robot.run(lambda: user.outcomes or len(user.tries) > tries, PROMPT)
-    _require_no_more(user, tries, when)
-    require_outcome(robot, user, when, "refused")
-    require_once(robot, user, when)
-    _require_no_more(user, tries, when)
-
-
-def _require_no_more(user: GripUser, tries: int, when: str) -> None:
-    """Require that a refusal is the end of it: there were so many tries, and are no more."""
-    if len(user.tries) > tries:
-        raise Failed(
-            expected=f"{when}: a refusal is an answer, so the gripper is not asked again.",
-            actual=f"The gripper was called {len(user.tries)} times.",
+    def require_once(self, when: str = "") -> None:
+        """Require that the outcome stays the only one."""
+        self._node.advance(AFTER_S, stride_s=COARSE_S)
+        self._node.require_that(
+            len(self.outcomes) == 1,
+            f"{when or self._when}, there is exactly one outcome.",
+            say_words(self.outcomes),
         )
 
+    def refuse(self, when: str) -> None:
+        """Refuse the try that is under way, and require that it is the last."""
+        self._node.forget(HOLD)  # what came with the request says nothing about the outcome
+        tries = len(self.tries)
+        self.tries[-1].answer(success=False)
 
-def examine_silence(rig: RobotRig) -> None:
-    """The gripper takes every request and answers none: its callback hangs, and once it raises.
+        def require_no_more() -> None:
+            self._node.require_that(
+                len(self.tries) <= tries,
+                f"{when}: a refusal is an answer, so the gripper is not asked again.",
+                f"The gripper was called {len(self.tries)} times.",
+            )
 
-    So it does with the next request, too: the tries and pauses of that one begin anew.
+        self._node.advance_until(lambda: self.has_gone_on(tries), PROMPT_S)
+        require_no_more()
+        self.require_outcome(when, "refused")
+        self.require_once()
+        require_no_more()
+
+    def require_patience(self) -> None:
+        """Require that there is no outcome yet, while one try has had no answer."""
+        said = f"After one try it said “{''.join(self.outcomes[:1])}”."
+        self._node.require_that(not self.outcomes, SECOND_TRY, said)
+
+    def require_second_try(self) -> None:
+        """Require that the gripper is tried once more before there is an outcome."""
+        self._node.advance_until(self.has_gone_on, LONGEST_S)
+        self.require_patience()
+        missing = f"There was no second try in {LONGEST_S:g} s."
+        self._node.require_that(len(self.tries) > 1, SECOND_TRY, missing)
+
+    def answer_again(self) -> None:
+        """Let the second try succeed, and require that it counts."""
+        self.require_second_try()
+        self.tries[1].answer(success=True)
+        self.require_outcome("When the second try was answered with success=True", "done")
+
+    def require_ignored(self, what: str) -> None:
+        """Require that an answer that has just been given does not count."""
+        self._node.advance(2 * STRIDE_S)
+        self._node.require_that(
+            not self.outcomes,
+            f"A try has 1 s. The answer to the {what}, and is ignored.",
+            f"It was taken for a present answer: it said “{''.join(self.outcomes[:1])}”.",
+        )
+
+    def require_failure(self, when: str, began_s: float) -> None:
+        """Require that it fails, after three tries' time, and that the heart beats on."""
+        self.require_outcome(when, "failed", DEADLINE_S)
+        lasted_s = self._node.now_s - began_s
+        self._node.require_that(
+            lasted_s >= SHORTEST_S,
+            f"{when}, three tries take 3 s, and the pauses 1.5 s: it may come back.",
+            f"“failed” came after {lasted_s:.1f} s.",
+        )
+        require_beats(self._node, when=when, since_s=began_s)
+
+
+def carry_out(
+    node: ClockBoundNode, gripper: ServiceServer, close: bool, delay_s: float, aside: str = ""
+) -> ExaminedGrip:
+    """Answer a first try with success after so many s, and require that it counts.
+
+    ``aside`` is a sentence to add if the gripper was called again.
     """
-    with run_client(rig) as (robot, user):
-        close = robot.draws.flag("the grip without an answer")
-        _given_up(robot, user, close, held=True)
-        user.tries[2].reply(True)
-        require_once(robot, user, f"{GIVEN_UP}, and a late answer to the third")
-        try:
-            _given_up(robot, user, not close)
-        except Failed as failed:
-            raise Failed(expected=failed.expected, actual=f"{failed.actual}{SECOND}") from None
-        _soon_after(robot, user)
-        robot.require_no_errors("unanswered")
-    rig.require_times_unasked(GripUser.CLIENT, plain_program_times.PAUSE)
+    grip = ExaminedGrip(node, gripper, close)
+    node.advance_until(lambda: False, delay_s)
+    if not grip.outcomes:
+        grip.tries[0].answer(success=True)
+    node.advance_until(grip.has_gone_on, PROMPT_S)
+    node.require_that(
+        len(grip.tries) == 1,
+        f"An answer after {delay_s:g} s is in time: one try is enough.",
+        f"The gripper was called {len(grip.tries)} times.{aside}",
+    )
+    grip.require_outcome(f"When the gripper answered success=True after {delay_s:g} s", "done")
+    return grip
 
 
-def _soon_after(robot: Robot, user: GripUser) -> None:
-    """Have a try answered late, but in time, when the time of one that was answered runs out."""
-    _carries_out(robot, user, True, 0.0)
-    robot.spend_time(APART)
-    _carries_out(robot, user, False, SLOW, LEFT)
+def give_up(
+    node: ClockBoundNode, gripper: ServiceServer, close: bool, *, stands_still: bool = False
+) -> ExaminedGrip:
+    """Answer no try, let the second one raise, and require three of them, pauses and outcome.
 
-
-def _given_up(robot: Robot, user: GripUser, close: bool, *, held: bool = False) -> None:
-    """Ask for a grip, answer no try, and require three of them, their pauses and the outcome.
-
-    ``held``: time stands still for a while when the first try has had its own.
+    ``stands_still``: time does so for a while when the first try has had its own.
     """
-    request_grip(robot, user, close)
-    began = user.now
+    grip = ExaminedGrip(node, gripper, close)
 
-    def goes_on() -> bool:
-        return len(user.tries) > 1 or bool(user.outcomes)
+    def advance_to(second_s: float, tries: int, stride_s: float = STRIDE_S) -> None:
+        left_s = grip.began_s + second_s - node.now_s
+        node.advance_until(lambda: grip.has_gone_on(tries), left_s, stride_s=stride_s)
 
-    # In half strides: they blur how short the first pause is.
-    robot.run(goes_on, ANSWER + STRIDE / 2, STRIDE / 2)
-    if held:
-        what = f"{ANSWER:g} s after the first try the next one came, or an outcome"
-        robot.require_still(goes_on, what, HELD_S)
-    robot.run(goes_on, 2 * FIRST_GAP + began - user.now, STRIDE / 2)
-    robot.run(goes_on, DEADLINE + began - user.now, COARSE)
-    if len(user.tries) > 1:
-        user.tries[1].crash()
-    robot.run(lambda: len(user.tries) > 2 or user.outcomes, DEADLINE + began - user.now)
-    if not user.outcomes:
-        user.holds = 0  # one that came with a try says nothing about the outcome
-    if not robot.run(lambda: user.outcomes, DEADLINE + began - user.now):
-        raise Failed(
-            expected=f"A gripper that never answers is given up within {LONGEST:g} s.",
-            actual=f"After {DEADLINE:.1f} s of simulated time there {_say_tries(len(user.tries))} "
-            f"and no outcome.{_hint_of_clock(user)}{robot.error_note()}",
-        )
-    said_at = user.now
-    times = [attempt.at for attempt in user.tries]
-    if len(times) != 3:
-        raise Failed(
-            expected="A gripper that never answers is tried three times.",
-            actual=f"There {_say_tries(len(times))} before the outcome “{user.outcomes[0]}”.",
-        )
-    require_data(user, close)
-    require_outcome(robot, user, GIVEN_UP, "failed")
-    _require_pauses(times[1] - times[0], times[2] - times[1])
-    _require_clear(said_at - times[2])
+    half_s = STRIDE_S / 2  # strides blur how short the first pause is
+    advance_to(node.now_s - grip.began_s + ANSWER_S + half_s, 1, half_s)
+    if stands_still:
+        what = f"{ANSWER_S:g} s after the first try the next one came, or an outcome"
+        node.require_standstill(grip.has_gone_on, what, HELD_S)
+    advance_to(2 * (ANSWER_S + PAUSE_S), 1, half_s)
+    advance_to(DEADLINE_S, 1, COARSE_S)
+    if len(grip.tries) > 1:
+        grip.tries[1].fail()
+    advance_to(DEADLINE_S, 2)
+    if not grip.outcomes:
+        node.forget(HOLD)  # what came with a try says nothing about the outcome
+    node.advance_until(grip.is_over, grip.began_s + DEADLINE_S - node.now_s)
+    _require_three_tries(node, grip)
+    return grip
 
 
-def _hint_of_clock(user: GripUser) -> str:
-    if len(user.tries) > 1:
-        return ""
-    return " A time-out on the wall clock does not run in simulated time."
-
-
-def _say_tries(count: int) -> str:
-    return "was 1 try" if count == 1 else f"were {count} tries"
-
-
-def _require_pauses(first: float, second: float) -> None:
-    if first < FIRST_GAP - 2 * ALLOWED - STRIDE / 4:  # a try and a pause: two times, each allowed
-        raise Failed(
-            expected="The second try comes 1.5 s after the first, or later: 1 s for an answer, and "
-            f"0.5 s of pause. Each may be {ALLOWED:g} s shorter.",
-            actual=f"It came {first:.1f} s after the first.",
-        )
-    if second - first < GROWTH - TOLERANCE:
-        raise Failed(
-            expected="The second pause is at least 0.5 s longer than the first one; "
-            f"{ALLOWED:g} s less do no harm.",
-            actual=f"The second try came {first:.1f} s after the first, and the third "
-            f"{second:.1f} s after the second.",
-        )
-
-
-def _require_clear(waited: float) -> None:
-    """Fail if the outcome came long after the third try had failed, when it was clear."""
-    if waited > ANSWER + PROMPT + TOLERANCE:
-        raise Failed(
-            expected=f"When the third try has had no answer for {ANSWER:g} s, the outcome is "
-            "clear, and comes at once.",
-            actual=f"It came {waited:.1f} s after the third try.",
-        )
-
-
-def examine_absence(rig: RobotRig) -> None:
-    """The gripper dies with a request in its hands, stays away, and comes back during another."""
-    rig.begin_anew()
-    with run_client(rig) as (robot, user):
-        began = user.now
-        began_on_the_wall = time.monotonic()
-        robot.spend_time(IDLE)
-        watched = time.monotonic() - began_on_the_wall
-        heartbeat.require_beats(user.beats, began, user.now, "Before the first request", watched)
-        request_grip(robot, user, True)
-    with run_client(rig, gripper=False) as (robot, user):
-        began = user.now
-        _require_failure(robot, user, "When the gripper died in the middle of a call", began)
-        user.request(True)
-        _require_failure(robot, user, "When there was no gripper at all", user.now)
-        user.request(False)
-        robot.spend_time(BACK)
-    with run_client(rig) as (robot, user):
-        _come_back(robot, user)
-        request_grip(robot, user, True)
-        user.tries[0].reply(True)
-        require_outcome(
-            robot, user, "When the gripper had come back and answered success=True", "done"
-        )
-        _refused_alive(robot, user)
-        robot.require_no_errors("absent")
-    rig.require_times_unasked(GripUser.CLIENT, plain_program_times.BEAT)
-
-
-def _come_back(robot: Robot, user: GripUser) -> None:
-    """Require that a gripper is tried that was not there when the grip was asked for."""
-    when = f"When the gripper was not there, and came back {BACK:g} s after the request"
-    if not robot.run(lambda: user.tries, DEADLINE - BACK):
-        raise Failed(
-            expected=f"{when}, it is called: the third try comes 3.5 s after the request or later.",
-            actual=f"It was never called. {describe_outcomes(user)}{robot.error_note()}",
-        )
-    require_data(user, False)
-    user.tries[-1].reply(True)
-    require_outcome(robot, user, f"{when} and answered success=True", "done")
-
-
-def _refused_alive(robot: Robot, user: GripUser) -> None:
-    """Have a grip refused, and let the heart beat on; what is said is another check's."""
-    request_grip(robot, user, True)
-    user.tries[0].reply(False)
-    began = user.now
-    robot.spend_time(2 * heartbeat.BEAT)
-    heartbeat.require_beats(user.beats, began, user.now, "After a refusal")
-
-
-def _require_failure(robot: Robot, user: GripUser, when: str, began: float) -> None:
-    require_outcome(robot, user, when, "failed", DEADLINE)
-    lasted = user.now - began
-    if lasted < SHORTEST:
-        raise Failed(
-            expected=f"{when}, three tries take 3 s, and the pauses 1.5 s: it may come back.",
-            actual=f"“failed” came after {lasted:.1f} s.",
-        )
-    heartbeat.require_beats(user.beats, began, user.now, when)
+def _require_three_tries(node: ClockBoundNode, grip: ExaminedGrip) -> None:
+    """Require that a grip was given up after three tries, with pauses that grow, and at once."""
+    ended_s, times_s = node.now_s, [attempt.at_s for attempt in grip.tries]
+    tries = there_were(len(times_s), "try", "tries")
+    hint = " A time-out on the wall clock does not run in simulated time."
+    node.require_that(
+        grip.outcomes,
+        f"A gripper that never answers is given up within {LONGEST_S:g} s.",
+        f"After {DEADLINE_S:.1f} s of simulated time {tries} and no outcome."
+        + ("" if len(times_s) > 1 else hint),
+    )
+    node.require_that(
+        len(times_s) == 3,
+        "A gripper that never answers is tried three times.",
+        f"{capitalize_first(tries)} before the outcome “{grip.outcomes[0]}”.",
+    )
+    grip.require_data()
+    grip.require_outcome(GIVEN_UP, "failed")
+    first_s, second_s = times_s[1] - times_s[0], times_s[2] - times_s[1]
+    node.require_that(  # a try and a pause: two times, each of which may be shorter
+        first_s >= ANSWER_S + PAUSE_S - 2 * ALLOWED_S - STRIDE_S / 4,
+        "The second try comes 1.5 s after the first, or later: 1 s for an answer, and 0.5 s of "
+        f"pause. Each may be {ALLOWED_S:g} s shorter.",
+        f"It came {first_s:.1f} s after the first.",
+    )
+    node.require_that(
+        second_s - first_s >= PAUSE_S - TOLERANCE_S,
+        f"The second pause is at least {PAUSE_S:g} s longer than the first one; {ALLOWED_S:g} s "
+        "less do no harm.",
+        f"The second try came {first_s:.1f} s after the first, and the third {second_s:.1f} s "
+        "after the second.",
+    )
+    node.require_that(
+        ended_s - times_s[2] <= ANSWER_S + PROMPT_S + TOLERANCE_S,
+        f"When the third try has had no answer for {ANSWER_S:g} s, the outcome is clear, and comes "
+        "at once.",
+        f"It came {ended_s - times_s[2]:.1f} s after the third try.",
+    )

@@ -2,7 +2,7 @@
 # reaches: the exam
 # exercise: safety
 # base: right-exemplar
-# told: which calls shutdown() in a drive, it stops the robot
+# told: which calls shutdown() in a drive, it stops the wheels
 # score: 14
 
 from autograder.examination.subject.server import SubjectServer

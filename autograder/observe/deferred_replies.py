@@ -1,4 +1,4 @@
-"""Servers of the examiner's that wait within a callback until they are told to go on."""
+"""Callbacks of the examiner's servers that wait until they are told to go on."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 
-class Held:
+class DeferredReplies:
     """The callbacks that wait, each in the executor of its server."""
 
     def __init__(self) -> None:
