@@ -35,7 +35,7 @@ from autograder.observe.plain_programs import ObservedProgram
 from autograder.observe.process_usage import ObservedProcess
 from autograder.observe.program_observer import ProgramObserver
 from autograder.observe.program_trials import Bounds, NodeTrials, served
-from autograder.observe.radio_link import open_radio
+from autograder.observe.radio_link import open_radio_link
 from autograder.observe.relays.observed_relays import ObservedRelays, relays_of
 from autograder.observe.services import Request, ServiceServer
 from autograder.observe.stepped_goal import SteppedGoal
@@ -57,7 +57,7 @@ DESCRIBED: dict[str, tuple[Any, ...]] = {
         declared_nodes, ObservedDesign, RosGraph, GraphTopic, GraphService, GraphReader,
         find_link_faults, MarkTracer, MarkedGoals, Trace,
     ),
-    "Nodes that hand on what they receive": (relays_of, ObservedRelays, hear_past, open_radio),
+    "Nodes that hand on what they receive": (relays_of, ObservedRelays, hear_past, open_radio_link),
     "Plain programs, and what a process holds": (
         ObservedProgram, NodeTrials, Bounds, served, ProgramObserver, ObservedProcess,
         require_flat, require_flat_lives,
