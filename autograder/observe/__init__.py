@@ -4,9 +4,9 @@ The door for exercises:
 
     from autograder.observe import Parameter, Service, Topic, one_node
 
-What only some exams need, they import from its own module, such as `autograder.observe.lifecycle`:
-then a change of it concerns the verdicts of these exams alone. `python -m autograder.observe`
-prints all of it.
+What only some exams need, they import from its own module, such as
+`autograder.observe.lifecycle.lifecycle_manager`: then a change of it concerns the verdicts of these
+exams alone. `python -m autograder.observe` prints all of it.
 """
 
 from autograder.observe.nouns import Action as Action

@@ -8,41 +8,41 @@ from collections.abc import Iterator
 from typing import Any
 
 from autograder import observe
-from autograder.observe.actions import ActionServerEnd, SentGoal
 from autograder.observe.choices import Choices, Question
-from autograder.observe.clock_bound_node import ClockBoundNode
+from autograder.observe.examiner.actions import ActionServerEnd, SentGoal
+from autograder.observe.examiner.lossless_listener import LosslessListener
+from autograder.observe.examiner.merged_subscriptions import MergedSubscription
+from autograder.observe.examiner.radio_link import open_radio_link
+from autograder.observe.examiner.services import Request, ServiceServer
 from autograder.observe.findings import in_context
-from autograder.observe.flat_rounds import require_flat, require_flat_lives
-from autograder.observe.graph import GraphService, GraphTopic, RosGraph
-from autograder.observe.graph_faults import find_link_faults
-from autograder.observe.graph_reader import GraphReader
-from autograder.observe.heartbeats import longest_silence, require_heartbeat
-from autograder.observe.late_joiner import hear_past
-from autograder.observe.lifecycle import LifecycleManager
-from autograder.observe.lifecycle_leaks import LifecycleLeaks
-from autograder.observe.lossless_listener import LosslessListener
-from autograder.observe.mark_trace import Trace
-from autograder.observe.mark_tracer import MarkTracer
-from autograder.observe.marked_goals import MarkedGoals
-from autograder.observe.merged_subscriptions import MergedSubscription
-from autograder.observe.multi_node_rig import Nodes, several_nodes
-from autograder.observe.node_graph import NodeGraph
-from autograder.observe.node_lives import NodeLives
-from autograder.observe.observed_design import ObservedDesign, declared_nodes
-from autograder.observe.observed_goal import ObservedGoal
-from autograder.observe.observer import Observer
-from autograder.observe.plain_programs import ObservedProgram
-from autograder.observe.process_usage import ObservedProcess
-from autograder.observe.program_observer import ProgramObserver
-from autograder.observe.program_trials import Bounds, NodeTrials, served
-from autograder.observe.radio_link import open_radio_link
+from autograder.observe.graph.graph_reader import GraphReader
+from autograder.observe.graph.link_faults import find_link_faults
+from autograder.observe.graph.node_graph import NodeGraph
+from autograder.observe.graph.ros_graph import GraphService, GraphTopic, RosGraph
+from autograder.observe.lifecycle.flat_rounds import require_flat, require_flat_lives
+from autograder.observe.lifecycle.lifecycle_leaks import LifecycleLeaks
+from autograder.observe.lifecycle.lifecycle_manager import LifecycleManager
+from autograder.observe.lifecycle.node_lives import NodeLives
+from autograder.observe.lifecycle.observer import Observer
+from autograder.observe.lifecycle.process_usage import ObservedProcess
+from autograder.observe.lifecycle.stepped_rate import MessageCounter
+from autograder.observe.marks.mark_trace import Trace
+from autograder.observe.marks.mark_tracer import MarkTracer
+from autograder.observe.marks.marked_goals import MarkedGoals
+from autograder.observe.marks.observed_design import ObservedDesign, declared_nodes
+from autograder.observe.programs.program_observer import ProgramObserver
+from autograder.observe.programs.stepped_trials import SteppedTrials
+from autograder.observe.relays.late_joiner import hear_past
 from autograder.observe.relays.observed_relays import ObservedRelays, relays_of
-from autograder.observe.services import Request, ServiceServer
-from autograder.observe.stepped_goal import SteppedGoal
-from autograder.observe.stepped_observer import SteppedObserver
-from autograder.observe.stepped_rate import MessageCounter
-from autograder.observe.stepped_trials import SteppedTrials
-from autograder.observe.stream_rate import StreamRate, require_stream
+from autograder.observe.several_nodes.clock_bound_node import ClockBoundNode
+from autograder.observe.several_nodes.heartbeats import longest_silence, require_heartbeat
+from autograder.observe.several_nodes.multi_node_rig import Nodes, several_nodes
+from autograder.observe.several_nodes.observed_goal import ObservedGoal
+from autograder.observe.several_nodes.plain_programs import ObservedProgram
+from autograder.observe.several_nodes.program_trials import Bounds, NodeTrials, served
+from autograder.observe.stepped_time.stepped_goal import SteppedGoal
+from autograder.observe.stepped_time.stepped_observer import SteppedObserver
+from autograder.observe.stepped_time.stream_rate import StreamRate, require_stream
 
 DESCRIBED: dict[str, tuple[Any, ...]] = {
     "One node": (

@@ -21,11 +21,11 @@ from rclpy.parameter import parameter_value_to_python
 
 from autograder.examination.check_context import CheckContext, Endpoints, StudentError
 from autograder.examination.exam import Failed
-from autograder.observe.examiner_end import ExaminerEnd
+from autograder.observe.examiner.examiner_end import ExaminerEnd
+from autograder.observe.examiner.services import Request
 from autograder.observe.nouns import Parameter, Service, Task, Topic
 from autograder.observe.patience import Patience
 from autograder.observe.phrases import say_words, with_reason
-from autograder.observe.services import Request
 from autograder.observe.span import PACES, Span
 from autograder.observe.stillness import Stillness
 from course.errors import WaitTimeout

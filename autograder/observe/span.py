@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import Any
 
 from autograder.examination.exam import Failed
-from autograder.observe.examiner_end import Heard
+from autograder.observe.examiner.examiner_end import Heard
 from autograder.observe.nouns import Topic
 from autograder.observe.phrases import capitalize_first
 

@@ -27,11 +27,11 @@ from autograder.exercises.architecture.robot_jobs import (
     WHEELS,
     Jobs,
 )
-from autograder.observe.graph import GraphTopic, RosGraph
-from autograder.observe.graph_faults import find_link_faults
-from autograder.observe.mark_trace import Trace
-from autograder.observe.marked_types import is_installed
-from autograder.observe.observed_design import ObservedDesign, declared_nodes
+from autograder.observe.graph.link_faults import find_link_faults
+from autograder.observe.graph.ros_graph import GraphTopic, RosGraph
+from autograder.observe.marks.mark_trace import Trace
+from autograder.observe.marks.marked_types import is_installed
+from autograder.observe.marks.observed_design import ObservedDesign, declared_nodes
 from autograder.observe.phrases import as_phrase, name_nodes
 
 THREADS = 8

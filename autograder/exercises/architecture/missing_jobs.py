@@ -20,8 +20,8 @@ from autograder.exercises.architecture.robot_jobs import (
     Jobs,
     may_tell_obstacles,
 )
-from autograder.observe.graph import GraphService, GraphTopic, RosGraph
-from autograder.observe.marked_types import TypeNotInstalledError, bears_marks, load_type
+from autograder.observe.graph.ros_graph import GraphService, GraphTopic, RosGraph
+from autograder.observe.marks.marked_types import TypeNotInstalledError, bears_marks, load_type
 from autograder.observe.phrases import as_phrase, name_nodes, who_does
 from course.design import message_tags
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from functools import cached_property
 
-from autograder.observe.graph import GraphService, GraphTopic, RosGraph
-from autograder.observe.marked_types import bears_marks
+from autograder.observe.graph.ros_graph import GraphService, GraphTopic, RosGraph
+from autograder.observe.marks.marked_types import bears_marks
 
 
 def _messages(package: str, *names: str) -> frozenset[str]:

@@ -9,8 +9,8 @@ from autograder.examination.exam import Failed, NotExaminable
 from autograder.exercises.patterns.robot import POSITION, Robot
 from autograder.exercises.patterns.scenarios import SCENARIOS
 from autograder.observe import Action
-from autograder.observe.marked_types import load_type
-from autograder.observe.stepped_goal import SteppedGoal
+from autograder.observe.marks.marked_types import load_type
+from autograder.observe.stepped_time.stepped_goal import SteppedGoal
 
 SPEED_MARGIN = 0.011  # m/s
 PART_OF_THE_WAY_M = 0.7

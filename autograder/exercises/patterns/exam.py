@@ -18,7 +18,7 @@ from autograder.exercises.patterns.plain_program import TRIALS
 from autograder.exercises.patterns.robot import CHARGE, POSITION, SPEED_AT_START, Robot
 from autograder.exercises.patterns.scenarios import CHOICES, SCENARIOS
 from autograder.observe.findings import in_context
-from autograder.observe.stream_rate import require_stream
+from autograder.observe.stepped_time.stream_rate import require_stream
 
 FILM_S, PASSING_S = 2.0, 0.3
 """Seconds of the node's clock in which pictures are counted, and in which a station is passed."""

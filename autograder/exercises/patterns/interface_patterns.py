@@ -7,8 +7,13 @@ from contextlib import suppress
 from autograder.examination.exam import Failed
 from autograder.exercises.patterns.robot import CHARGE, POSITION, SPEED, Robot
 from autograder.exercises.patterns.scenarios import CHOICES, SCENARIOS
-from autograder.observe.declared_parameters import SET_PARAMETERS
-from autograder.observe.name_patterns import Patterns, find_near_miss, find_patterns, with_article
+from autograder.observe.graph.name_patterns import (
+    Patterns,
+    find_near_miss,
+    find_patterns,
+    with_article,
+)
+from autograder.observe.stepped_time.declared_parameters import SET_PARAMETERS
 
 AT_ONCE_S = 1.0
 """Seconds for what comes up with the node."""

@@ -11,8 +11,8 @@ from autograder.exercises.patterns.drive import Drive
 from autograder.exercises.patterns.drive_ends import STOPS_S, require_stopped_by
 from autograder.exercises.patterns.interface_patterns import await_patterns, find_usable
 from autograder.exercises.patterns.robot import NODE, POSITION, THREADS, Findings, Robot
-from autograder.observe.stepped_trials import NOT_SEEN, SteppedTrials, as_not_examinable
-from autograder.observe.stream_rate import await_publication
+from autograder.observe.programs.stepped_trials import NOT_SEEN, SteppedTrials, as_not_examinable
+from autograder.observe.stepped_time.stream_rate import await_publication
 
 MORE, LESS = 1.4, 0.7
 """Times what the task says from which on a time is too long, or a rate too high, or too low."""

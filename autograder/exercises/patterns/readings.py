@@ -11,8 +11,11 @@ from autograder.examination.exam import Failed
 from autograder.exercises.patterns.robot import CHARGE, Robot
 from autograder.exercises.patterns.scenarios import SCENARIOS
 from autograder.observe import Topic
-from autograder.observe.late_subscription import LateSubscription, require_for_late_joiners
-from autograder.observe.stream_rate import StreamRate, StreamStretch
+from autograder.observe.stepped_time.late_subscription import (
+    LateSubscription,
+    require_for_late_joiners,
+)
+from autograder.observe.stepped_time.stream_rate import StreamRate, StreamStretch
 
 PICTURES_HZ, ABOUT_HZ = (9.0, 11.0), (8.0, 12.0)
 """Pictures a second, and as far as a short time tells."""

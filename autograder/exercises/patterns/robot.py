@@ -16,12 +16,12 @@ from std_msgs.msg import Float64
 from autograder.examination.check_context import CheckContext
 from autograder.exercises.patterns.scenarios import SCENARIOS
 from autograder.observe import Parameter, Topic
-from autograder.observe.declared_parameters import DeclaredParameter
-from autograder.observe.late_subscription import LateSubscription
-from autograder.observe.merged_subscriptions import MergedSubscription
-from autograder.observe.name_patterns import Patterns
-from autograder.observe.quiet_node import QuietNode
-from autograder.observe.stepped_observer import Host, SteppedObserver
+from autograder.observe.examiner.merged_subscriptions import MergedSubscription
+from autograder.observe.examiner.quiet_node import QuietNode
+from autograder.observe.graph.name_patterns import Patterns
+from autograder.observe.stepped_time.declared_parameters import DeclaredParameter
+from autograder.observe.stepped_time.late_subscription import LateSubscription
+from autograder.observe.stepped_time.stepped_observer import Host, SteppedObserver
 from autograder.observe.stillness import Stillness
 
 NODE, THREADS = "RobotInterface", 4

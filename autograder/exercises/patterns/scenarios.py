@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from autograder.observe.choices import Choices, Question
-from autograder.observe.declared_parameters import SET_PARAMETERS
+from autograder.observe.stepped_time.declared_parameters import SET_PARAMETERS
 
 FIBONACCI = "example_interfaces/action/Fibonacci or test_msgs/action/Fibonacci"
 """The chapter's Fibonacci, and what stands in for it on a machine without a compiler."""

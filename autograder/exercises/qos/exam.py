@@ -38,8 +38,8 @@ from autograder.exercises.qos.stop_events import (
     require_only_events,
 )
 from autograder.observe import Topic
-from autograder.observe.endpoint_qos import is_reliable, require_endpoints
-from autograder.observe.late_joiner import hear_past
+from autograder.observe.relays.endpoint_qos import is_reliable, require_endpoints
+from autograder.observe.relays.late_joiner import hear_past
 from autograder.observe.relays.observed_relays import relays_of
 from autograder.observe.sequence_faults import describe_fault, faulty_numbers
 

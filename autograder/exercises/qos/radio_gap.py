@@ -11,9 +11,13 @@ from __future__ import annotations
 
 from autograder.examination.exam import Failed
 from autograder.exercises.qos.readings import CAMERA, STOP, Sensor, SensorRig
-from autograder.observe.endpoint_qos import is_reliable, lossless_profile, undemanding_profile
-from autograder.observe.radio_link import open_radio_link
+from autograder.observe.examiner.radio_link import open_radio_link
 from autograder.observe.relays.arrivals import Arrivals
+from autograder.observe.relays.endpoint_qos import (
+    is_reliable,
+    lossless_profile,
+    undemanding_profile,
+)
 
 LOST = {STOP: 100, CAMERA: 5}
 """Readings sent while the link is down: as many stop events as the task promises to keep."""

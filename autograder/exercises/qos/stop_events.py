@@ -9,9 +9,9 @@ from autograder.examination.exam import Failed
 from autograder.exercises.qos.equal_readings import PRESSES
 from autograder.exercises.qos.readings import DRIVERS, STOP, SensorRig
 from autograder.exercises.qos.slow_consumer import require_backlog
-from autograder.observe.endpoint_qos import lossless_profile, undemanding_profile
 from autograder.observe.patience import SETTLE_S
 from autograder.observe.relays.arrivals import Arrivals
+from autograder.observe.relays.endpoint_qos import lossless_profile, undemanding_profile
 from autograder.observe.relays.message_stream import LAG_S
 from autograder.observe.sequence_faults import (
     describe_fault,

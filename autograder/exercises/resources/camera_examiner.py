@@ -9,7 +9,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int32
 
-from autograder.observe.lossless_listener import LosslessListener, Published
+from autograder.observe.examiner.lossless_listener import LosslessListener, Published
 from autograder.observe.nouns import Topic
 
 IMAGE, ZOOM, SNAPSHOT = "camera/image", "camera/zoom", "camera/snapshot"

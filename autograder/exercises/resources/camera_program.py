@@ -10,7 +10,7 @@ from __future__ import annotations
 from autograder.examination.plain_programs import Program
 from autograder.exercises.resources.camera_examiner import IMAGE, SNAPSHOT, ExaminerNode
 from autograder.exercises.resources.rig import CameraRig
-from autograder.observe.program_observer import ProgramObserver
+from autograder.observe.programs.program_observer import ProgramObserver
 
 KEPT_KIB = 1024
 """KiB that a life, a start or a round may keep: nobody has Python collect what is garbage."""

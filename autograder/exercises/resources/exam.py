@@ -29,7 +29,7 @@ from autograder.exercises.resources.leaks import (
 from autograder.exercises.resources.managed import run_managed
 from autograder.exercises.resources.managed_ctrl_c import require_managed_in_program
 from autograder.exercises.resources.rig import DRIVER, MANAGED, RATE_HZ, CameraRig, new_device
-from autograder.observe.flat_rounds import require_flat_lives
+from autograder.observe.lifecycle.flat_rounds import require_flat_lives
 from autograder.observe.nouns import Parameter
 
 EXAM: Exam[CameraRig] = Exam(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from autograder.exercises.resources.driver import Driver, attempt_start, start_driver
 from autograder.exercises.resources.rig import DRIVER, PERIOD_S, STEP_S, CameraRig, new_device
-from autograder.observe.flat_rounds import require_flat
-from autograder.observe.observer import ENDED_S
-from autograder.observe.process_usage import Usage
+from autograder.observe.lifecycle.flat_rounds import require_flat
+from autograder.observe.lifecycle.observer import ENDED_S
+from autograder.observe.lifecycle.process_usage import Usage
 
 PICTURES = 5
 """A life, of 64 KiB: who keeps them is known by their number."""

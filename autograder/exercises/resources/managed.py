@@ -14,9 +14,9 @@ from autograder.exercises.resources.rig import (
     ObservedCamera,
     new_device,
 )
-from autograder.observe.flat_rounds import require_flat
-from autograder.observe.lifecycle import LifecycleManager
-from autograder.observe.lifecycle_leaks import LifecycleLeaks
+from autograder.observe.lifecycle.flat_rounds import require_flat
+from autograder.observe.lifecycle.lifecycle_leaks import LifecycleLeaks
+from autograder.observe.lifecycle.lifecycle_manager import LifecycleManager
 from autograder.observe.phrases import as_phrase, capitalize_first, pictures_phrase
 from course.runtime.waiting import Deadline
 

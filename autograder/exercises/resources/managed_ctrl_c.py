@@ -10,12 +10,12 @@ from autograder.examination.plain_programs import Programs
 from autograder.exercises.resources.camera_examiner import IMAGE
 from autograder.exercises.resources.camera_program import GONE, KEPT_KIB, CameraProgram
 from autograder.exercises.resources.rig import MANAGED, RATE_HZ, CameraRig, new_device
-from autograder.observe.lifecycle import LifecycleManager, find_lifecycle_node
-from autograder.observe.lifecycle_leaks import memory_kept
-from autograder.observe.observer import ENDED_S
+from autograder.observe.lifecycle.lifecycle_leaks import memory_kept
+from autograder.observe.lifecycle.lifecycle_manager import LifecycleManager, find_lifecycle_node
+from autograder.observe.lifecycle.observer import ENDED_S
+from autograder.observe.lifecycle.process_usage import Usage, list_kept
 from autograder.observe.phrases import as_phrase
-from autograder.observe.process_usage import Usage, list_kept
-from autograder.observe.program_observer import Faults, require_no_fault
+from autograder.observe.programs.program_observer import Faults, require_no_fault
 
 LIVES = 3
 USUAL_HZ = 20

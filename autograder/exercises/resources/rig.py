@@ -18,12 +18,12 @@ from std_srvs.srv import Trigger
 from autograder.examination.check_context import CheckContext
 from autograder.examination.exam import Failed
 from autograder.exercises.resources.camera_examiner import IMAGE, SNAPSHOT, ZOOM, ExaminerNode
-from autograder.observe.lossless_listener import Published
-from autograder.observe.node_lives import NodeLives
+from autograder.observe.examiner.lossless_listener import Published
+from autograder.observe.lifecycle.node_lives import NodeLives
+from autograder.observe.lifecycle.observer import ENDED_S
+from autograder.observe.lifecycle.stepped_rate import OVER, MessageCounter
 from autograder.observe.nouns import Service, Topic
-from autograder.observe.observer import ENDED_S
 from autograder.observe.patience import SETTLE_S
-from autograder.observe.stepped_rate import OVER, MessageCounter
 
 DRIVER, MANAGED = "CameraDriver", "ManagedCamera"
 PERIOD_S, RATE_HZ = 0.1, 10.0

@@ -10,11 +10,11 @@ from test_msgs.action import Fibonacci as Drive
 
 from autograder.exercises.safety.speed_limits import is_motion
 from autograder.observe import Action, Task, Topic
-from autograder.observe.actions import SentGoal
-from autograder.observe.clock_bound_node import ClockBoundNode
-from autograder.observe.heartbeats import longest_silence
-from autograder.observe.observed_goal import ObservedGoal
-from autograder.observe.plain_programs import Clocked
+from autograder.observe.examiner.actions import SentGoal
+from autograder.observe.several_nodes.clock_bound_node import ClockBoundNode
+from autograder.observe.several_nodes.heartbeats import longest_silence
+from autograder.observe.several_nodes.observed_goal import ObservedGoal
+from autograder.observe.several_nodes.plain_programs import Clocked
 
 COMMANDS = Topic("cmd_vel", Twist)
 FAULTS = Topic("drive/fault", String, value=lambda message: message.data)

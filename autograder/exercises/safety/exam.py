@@ -28,11 +28,11 @@ from autograder.exercises.safety.drive_server import DRIVE_SERVER, SLACK_S, TOLE
 from autograder.exercises.safety.gripper_client import GRIPPER, GRIPPER_CLIENT, ExaminedGrip
 from autograder.exercises.safety.navigator_client import NAVIGATION_CLIENT, ExaminedJourney
 from autograder.exercises.safety.speed_limits import SPEED_SERVER, require_refused, require_set
-from autograder.observe.actions import ActionServerEnd
-from autograder.observe.clock_bound_node import WallWait
-from autograder.observe.multi_node_rig import Nodes, several_nodes
+from autograder.observe.examiner.actions import ActionServerEnd
+from autograder.observe.examiner.services import ServiceServer
 from autograder.observe.phrases import say_words
-from autograder.observe.services import ServiceServer
+from autograder.observe.several_nodes.clock_bound_node import WallWait
+from autograder.observe.several_nodes.multi_node_rig import Nodes, several_nodes
 
 READ_SERVICES = "Chapter 5, “Services: error handling”"
 EXAM: Exam[Nodes] = Exam("safety", several_nodes(program_trials.TRIALS), read=READ_SERVICES)

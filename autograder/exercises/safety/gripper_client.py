@@ -8,12 +8,12 @@ from std_msgs.msg import Bool, Empty, String
 from std_srvs.srv import SetBool
 
 from autograder.observe import Service, Task, Topic
-from autograder.observe.clock_bound_node import ClockBoundNode
-from autograder.observe.heartbeats import require_heartbeat
+from autograder.observe.examiner.services import Request, ServiceServer
 from autograder.observe.observed_node import STRIDE_S
 from autograder.observe.phrases import capitalize_first, say_words, there_were
-from autograder.observe.plain_programs import Clocked
-from autograder.observe.services import Request, ServiceServer
+from autograder.observe.several_nodes.clock_bound_node import ClockBoundNode
+from autograder.observe.several_nodes.heartbeats import require_heartbeat
+from autograder.observe.several_nodes.plain_programs import Clocked
 
 REQUEST = Topic("grip/request", Bool)
 OUTCOME = Topic("grip/outcome", String, value=lambda message: message.data)

@@ -10,11 +10,11 @@ from test_msgs.action import Fibonacci as Drive
 
 from autograder.exercises.safety.speed_limits import is_motion
 from autograder.observe import Action, Task, Topic
-from autograder.observe.actions import ActionServerEnd
-from autograder.observe.clock_bound_node import ClockBoundNode
+from autograder.observe.examiner.actions import ActionServerEnd
 from autograder.observe.observed_node import STRIDE_S
 from autograder.observe.phrases import say_words
-from autograder.observe.plain_programs import Clocked
+from autograder.observe.several_nodes.clock_bound_node import ClockBoundNode
+from autograder.observe.several_nodes.plain_programs import Clocked
 
 REQUEST = Topic("navigate/request", Int32)
 OUTCOME = Topic("navigate/outcome", String, value=lambda message: message.data)

@@ -1,7 +1,8 @@
 """What is done to the four nodes once more in a plain program, in short, and how long it takes.
 
 All that the exam provokes is provoked there: what leaves a callback ends the program. How the nodes
-deal with it is no matter here, but for the times. See `autograder.observe.program_trials`.
+deal with it is no matter here, but for the times. See
+`autograder.observe.several_nodes.program_trials`.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ from autograder.exercises.safety.drive_server import DRIVE, DRIVE_SERVER, motion
 from autograder.exercises.safety.gripper_client import GRIPPER, GRIPPER_CLIENT, HEARTBEAT, Grip
 from autograder.exercises.safety.navigator_client import NAVIGATE, NAVIGATION_CLIENT, Journey
 from autograder.exercises.safety.speed_limits import SET_SPEED, SPEED_SERVER
-from autograder.observe.actions import ActionServerEnd, SentGoal
-from autograder.observe.heartbeats import longest_silence
-from autograder.observe.plain_programs import ObservedProgram
-from autograder.observe.program_trials import Bounds, NodeTrials, served
-from autograder.observe.services import Request, ServiceServer
+from autograder.observe.examiner.actions import ActionServerEnd, SentGoal
+from autograder.observe.examiner.services import Request, ServiceServer
+from autograder.observe.several_nodes.heartbeats import longest_silence
+from autograder.observe.several_nodes.plain_programs import ObservedProgram
+from autograder.observe.several_nodes.program_trials import Bounds, NodeTrials, served
 
 SLOW_S, LATE_S = 0.7, 1.5  # after which a try is answered, in time and too late
 BEATS = 2  # after the first, over which they are timed

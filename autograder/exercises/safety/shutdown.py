@@ -19,9 +19,9 @@ from autograder.exercises.safety.drive_server import (
     drives_afterwards,
     motions,
 )  # fmt: skip
-from autograder.observe.actions import SentGoal
-from autograder.observe.multi_node_rig import Nodes
-from autograder.observe.plain_programs import ObservedProgram, ProgramEnded
+from autograder.observe.examiner.actions import SentGoal
+from autograder.observe.several_nodes.multi_node_rig import Nodes
+from autograder.observe.several_nodes.plain_programs import ObservedProgram, ProgramEnded
 
 # Seconds of wall time that shutdown() may take where it does not wait, 0.01 s as a rule; and in
 # which all sleep in a program, and nothing stops the wheels: something waits.

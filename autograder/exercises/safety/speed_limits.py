@@ -14,8 +14,8 @@ from std_msgs.msg import Bool
 
 from autograder.examination.draws import Draws
 from autograder.observe import Service, Task, Topic
-from autograder.observe.clock_bound_node import ClockBoundNode
 from autograder.observe.phrases import as_phrase, with_reason
+from autograder.observe.several_nodes.clock_bound_node import ClockBoundNode
 
 LIMITS = Topic("wheels/limits", Twist, value=lambda message: (message.linear.x, message.angular.z))
 COMMANDS = Topic("cmd_vel", Twist)

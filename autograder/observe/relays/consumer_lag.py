@@ -23,8 +23,8 @@ from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, TypeVar
 
-from autograder.observe.observed_process import ObservedProcess
 from autograder.observe.relays.arrivals import Arrivals
+from autograder.observe.relays.observed_process import ObservedProcess
 
 WATCHED_S = 0.8  # after a pause; from then on a fresh message shows that a consumer keeps up
 FRESH_S = 0.2  # a control loop at 5 Hz that acts on the newest hands it on within this time

@@ -10,11 +10,11 @@ from typing import Any, Generic, TypeVar
 
 from autograder.examination.check_context import CheckContext
 from autograder.examination.exam import Failed
-from autograder.observe.observed_process import ObservedProcess
-from autograder.observe.quiet_node import QuietNode
+from autograder.observe.examiner.quiet_node import QuietNode
 from autograder.observe.relays.arrivals import Arrivals
 from autograder.observe.relays.marks import MarkedMessages
 from autograder.observe.relays.message_stream import LAG_S
+from autograder.observe.relays.observed_process import ObservedProcess
 from autograder.observe.relays.relay_path import RelayPath
 
 FOUND_S = 2.0

@@ -9,9 +9,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 
-from autograder.observe.observed_process import ObservedProcess
 from autograder.observe.relays.arrivals import Arrivals
 from autograder.observe.relays.message_stream import LAG_S
+from autograder.observe.relays.observed_process import ObservedProcess
 
 SINGLES = 16
 """Messages that are sent one by one."""

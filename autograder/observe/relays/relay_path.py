@@ -12,9 +12,9 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.time import Time
 
-from autograder.observe.endpoint_qos import TopicEnds, lossless_profile, undemanding_profile
-from autograder.observe.publication_times import published_at, received_at
+from autograder.observe.examiner.publication_times import published_at, received_at
 from autograder.observe.relays.arrivals import Arrivals
+from autograder.observe.relays.endpoint_qos import TopicEnds, lossless_profile, undemanding_profile
 from autograder.observe.relays.marks import Mark, MarkedMessages
 from autograder.observe.relays.message_stream import UNLIMITED, MessageStream
 

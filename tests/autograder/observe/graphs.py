@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from autograder.observe.graph import End, GraphService, GraphTopic, RosGraph
+from autograder.observe.graph.ros_graph import End, GraphService, GraphTopic, RosGraph
 
 SCAN = "sensor_msgs/msg/LaserScan"
 ARRAY = "geometry_msgs/msg/PoseArray"

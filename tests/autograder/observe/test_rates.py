@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from autograder.observe.stepped_rate import StepCount
-from autograder.observe.wall_rate import Take
+from autograder.observe.lifecycle.stepped_rate import StepCount
+from autograder.observe.programs.wall_rate import Take
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import pytest
 
 from autograder.examination.exam import Failed
 from autograder.observe import Topic
-from autograder.observe.examiner_end import Heard
+from autograder.observe.examiner.examiner_end import Heard
 from autograder.observe.span import Span, first_gap, rate_of
 
 BEATS = Topic("beats", object)

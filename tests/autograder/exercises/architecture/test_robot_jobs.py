@@ -6,7 +6,7 @@ import pytest
 
 from autograder.exercises.architecture.missing_jobs import why_no_obstacles
 from autograder.exercises.architecture.robot_jobs import Jobs
-from autograder.observe.graph import GraphService
+from autograder.observe.graph.ros_graph import GraphService
 from tests.autograder.observe.graphs import ARRAY, SCAN, TWIST, graph, topic
 
 

@@ -9,11 +9,11 @@ import pytest
 from std_msgs.msg import String
 
 from autograder.exercises.qos.readings import CAMERA, IMU, LIDAR, SENSORS, STOP, Sensor
-from autograder.observe.endpoint_qos import lossless_profile
-from autograder.observe.quiet_node import QuietNode
+from autograder.observe.examiner.quiet_node import QuietNode
+from autograder.observe.examiner.spinner import Spinner
+from autograder.observe.relays.endpoint_qos import lossless_profile
 from autograder.observe.relays.marks import Mark
 from autograder.observe.relays.relay_path import RelayPath
-from autograder.observe.spinner import Spinner
 from course import Session
 
 RUN = 8_000_000

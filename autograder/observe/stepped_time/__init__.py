@@ -1,0 +1,1 @@
+"""Streams and goals of a node whose time goes on in small steps."""
