@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from autograder.examination.exam import Failed
 from autograder.exercises.qos.readings import CAMERA, STOP, Sensor, SensorRig
+from autograder.exercises.qos.single_readings import find_prompt
 from autograder.observe.examiner.radio_link import open_radio_link
 from autograder.observe.relays.arrivals import Arrivals
 from autograder.observe.relays.endpoint_qos import (
@@ -32,7 +33,7 @@ def lose_readings(rig: SensorRig) -> dict[Sensor, list[int]]:
     The last one of the gap may have got through: a driver sends a reading to one listener after the
     other, and it was seen at the near end. Who heard nothing, not even before the gap, is left out.
     """
-    heard = {STOP: Arrivals(), CAMERA: Arrivals()}
+    heard = {sensor: Arrivals() for sensor in LOST if sensor in find_prompt(rig)}
     # The far consumer of pictures asks for what the student's own asks for.
     asks_reliable = all(map(is_reliable, rig.paths[CAMERA].find_ends().subscriptions))
     with open_radio_link(rig.bench) as link:

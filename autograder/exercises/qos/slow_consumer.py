@@ -11,7 +11,11 @@ from dataclasses import dataclass
 
 from autograder.examination.exam import Failed
 from autograder.exercises.qos.readings import CAMERA, CONSUMERS, IMU, LIDAR, STOP, Sensor, SensorRig
-from autograder.exercises.qos.single_readings import require_each_published, send_singles
+from autograder.exercises.qos.single_readings import (
+    find_prompt,
+    require_each_published,
+    send_singles,
+)
 from autograder.observe.relays.slow_reader import (
     PROMPT_S,
     TRIES,
@@ -45,7 +49,8 @@ def pause_for_long(rig: SensorRig) -> Pause[Sensor]:
     """Keep the consumer busy for long, while readings of all sensors come in."""
     singles = rig.run_once(send_singles)
     thinned = [sensor for sensor, single in singles.items() if single.is_thinned]
-    return pause_consumer(rig, LONG_PAUSE, unwatched=thinned)
+    traffic = {sensor: LONG_PAUSE[sensor] for sensor in find_prompt(rig)}
+    return pause_consumer(rig, traffic, unwatched=thinned)
 
 
 def require_backlog(rig: SensorRig, sensor: Sensor) -> Backlog:

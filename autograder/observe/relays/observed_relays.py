@@ -49,6 +49,7 @@ class ObservedRelays(ObservedProcess, Generic[KindT]):
         self.spinner.add_node(self.node)
         self.consumer = consumer
         self._probes = 0  # how often probed
+        self._silences: dict[KindT, str] | None = None  # as soon as that is known
         self._experiments: dict[Any, Any] = {}
 
     @contextmanager
@@ -78,25 +79,32 @@ class ObservedRelays(ObservedProcess, Generic[KindT]):
             for path in paths:
                 path.renew_stand_in()
 
-    def require_flow(self, expected: str) -> None:
-        """Require that messages of each kind come out, and begin to listen for them.
+    def find_silences(self) -> dict[KindT, str]:
+        """Return why nothing comes out of each kind of which nothing does, in a sentence.
+
+        From then on what comes out is heard, and the stand-ins offer what the nodes do by then.
+        """
+        if self._silences is None:
+            for path in self.paths.values():
+                path.listen_to_output()
+            heard = {kind: path.handed for kind, path in self.paths.items()}
+            silent = self.probe(heard, give_up=lambda kind: self.paths[kind].find_ends().refusals)
+            self._silences = {kind: self.paths[kind].describe_silence() for kind in silent}
+            self.have_stand_ins()
+            if self.can_hold:
+                with self._standing_in():
+                    self.probe({kind: there for kind, there in heard.items() if kind not in silent})
+        return self._silences
+
+    def require_flow(self, kind: KindT, expected: str) -> None:
+        """Require that messages of a kind come out.
 
         Raises:
-            Failed: some do not.
+            Failed: they do not.
         """
-        for path in self.paths.values():
-            path.listen_to_output()
-        heard = {kind: path.handed for kind, path in self.paths.items()}
-        silent = self.probe(heard, give_up=lambda kind: self.paths[kind].find_ends().refusals)
-        if silent:
-            refused_first = sorted(silent, key=lambda k: not self.paths[k].find_ends().refusals)
-            told = " ".join(self.paths[kind].describe_silence() for kind in refused_first)
-            actual = f"{told.removesuffix('.')}{self.error_note()}."
+        if why := self.find_silences().get(kind):
+            actual = f"{why.removesuffix('.')}{self.error_note()}."
             raise Failed(expected=expected, actual=actual)
-        self.have_stand_ins()  # which offer what the student's nodes do by now
-        if self.can_hold:
-            with self._standing_in():
-                self.probe(heard)
 
     def probe(
         self, heard: Mapping[KindT, Arrivals], give_up: Callable[[KindT], Any] = lambda _: False

@@ -116,13 +116,13 @@ def send_one_by_one(
         asked = [
             relay
             for relay in relays
-            if len(relay.missed) <= FORGIVEN and (number < SINGLES or not relay.is_known)
+            if len(relay.missed) <= FORGIVEN
+            and not relay.is_slow
+            and (number < SINGLES or not relay.is_known)
         ]
         if not asked:
             break
         _send_singles(process, asked, number, at_once_s)
-        if any(relay.is_slow for relay in relays):
-            break
     # Perhaps it was the machine that did not come to it.
     process.wait(lambda: not any(relay.keeps_back for relay in relays))
 

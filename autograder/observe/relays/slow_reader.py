@@ -211,11 +211,12 @@ class Pause(Generic[KindT]):
 
     def _watch(self, unwatched: Collection[KindT]) -> None:
         """See whether the consumer keeps up while messages come in at their rate."""
-        for kind, path in self._relays.paths.items():
+        for kind, stream in self._streams.items():
             if self._traffic[kind].limit < UNLIMITED or kind in unwatched:
-                self._streams[kind].stop()
+                stream.stop()
                 continue
-            self._streams[kind].keep_rate()
+            stream.keep_rate()
+            path = self._relays.paths[kind]
             self.lags[kind] = ConsumerLag(
                 path.published, path.handed, self._series, self._resumed_ns,
                 rate_hz=kind.rate_hz, most_waiting=kind.most,
@@ -263,8 +264,9 @@ class Pause(Generic[KindT]):
     def may_have_expired_late(self) -> bool:
         """Whether what was too old may be DDS's fault, which now and then expires it late."""
         return any(
-            path.find_ends().can_expire and self.backlog(kind).is_stale(kind.most, kind.rate_hz)
-            for kind, path in self._relays.paths.items()
+            self._relays.paths[kind].find_ends().can_expire
+            and self.backlog(kind).is_stale(kind.most, kind.rate_hz)
+            for kind in self._traffic
         )
 
 

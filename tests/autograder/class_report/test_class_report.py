@@ -584,7 +584,7 @@ def test_the_report_of_a_graded_class(graded: Path) -> None:
     by_name = {check.name: check for check in report.checks}
     assert set(by_name) == set(exercises.load_exam("qos").checks)
     assert (by_name["imu_burst"].passed, by_name["imu_burst"].failed) == (2, 2)
-    assert by_name["readings_flow"].failure_rate == 0
+    assert by_name["lidar_flows"].failure_rate == 0
     assert set(report.times.seconds) == {"ann", "bob", "cy", "-dan"}
     assert all(seconds > 0 for seconds in report.times.seconds.values())
     assert report.feedback[0].students == ("bob", "cy")
