@@ -17,7 +17,8 @@ from autograder.observe.lifecycle.process_usage import Usage, list_kept
 from autograder.observe.phrases import as_phrase
 from autograder.observe.programs.program_observer import Faults, require_no_fault
 
-LIVES = 3
+LIVES, TAKES = 3, 2
+"""In a program; and programs, as one may end or be slow on a busy machine: the last take counts."""
 USUAL_HZ = 20
 """Pictures a second: a rate is taken in half the time that the default one takes."""
 ROUND_HZ = 0.1
@@ -35,10 +36,14 @@ def require_managed_in_program(rig: CameraRig, check: str, node: str) -> None:
     """Fail if the managed camera ``node`` has shown something against a check in a program."""
 
     def watch_managed(programs: Programs) -> Faults:
-        with programs.program([(MANAGED, [])], twice=True) as program:
-            seen = ManagedWatch(rig, program, new_device())
-            seen.watch_lives(node)
-            return seen.faults
+        faults: Faults = {}
+        for _ in range(TAKES):
+            with programs.program([(MANAGED, [])], twice=True) as program:
+                seen = ManagedWatch(rig, program, new_device())
+                seen.watch_lives(node)
+            if not (faults := seen.faults):
+                break
+        return faults
 
     require_no_fault(rig, check, watch_managed)
 
