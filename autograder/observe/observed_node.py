@@ -178,6 +178,7 @@ class ObservedNode:
         Raises:
             Failed: a callback held up the node for so long that its clock stood still.
         """
+        self.rest()  # what was sent has been dealt with before time goes on
         return self._pass(seconds, when, stride_s, PACES[0] if once else 0.0, once=once)
 
     def _pass(

@@ -131,7 +131,7 @@ def gripper_retries(nodes: Nodes) -> None:
     A hiccup is worth a second try. A client that tries for ever never tells anybody that the
     gripper is dead, and one that tries without pauses keeps it from recovering.
     """
-    node = nodes.node(GRIPPER_CLIENT, fresh=True)
+    node = nodes.node(GRIPPER_CLIENT, new_session=True)
     with node.served_by(ServiceServer, GRIPPER) as gripper:
         close = nodes.draws.flag("the grip without an answer")
         grip = gripper_client.give_up(node, gripper, close, stands_still=True)
@@ -438,7 +438,7 @@ def gripper_absent(nodes: Nodes) -> None:
 
     A node that blocks looks dead to the safety monitor, which then stops the whole robot.
     """
-    node = nodes.node(GRIPPER_CLIENT, fresh=True)
+    node = nodes.node(GRIPPER_CLIENT, new_session=True)
     with node.served_by(ServiceServer, GRIPPER) as gripper:
         began = time.monotonic()
         node.advance(2.0)

@@ -30,27 +30,31 @@ class Nodes:
         self._trials = ProgramTrials(bench, self._still, trials)
         self.draws: Draws = bench.draws
 
-    def node(self, task: Task, *, fresh: bool = False) -> ClockBoundNode:
+    def node(self, task: Task, *, fresh: bool = False, new_session: bool = False) -> ClockBoundNode:
         """Return the node of a task, on simulated time that only `advance` moves.
 
         The check before has left it there if it has passed, and was about the same node: what that
-        did must not matter. A new one is made in a session of its own, whose time begins at 0: a
-        constructor always finds the clock at 0, and a thread that it starts in a session where
-        time has gone on would have to catch up first.
+        did must not matter. After one that failed there is a new session, as callbacks may be left
+        that never end; else another would have to be discovered first.
 
         Args:
             task: what it is connected to.
             fresh: it is made anew, in any case.
+            new_session: so is its session, whose time begins at 0. In one where time has gone on, a
+                thread that a constructor starts has to catch up with it first.
 
         Raises:
             StudentError: it cannot be made.
             Failed: it lacks an endpoint of the task.
         """
-        if fresh or self._present is None or self._present[0] is not task:
-            self._present = None
-            self._bench.subject.open(threads=task.threads, sim_time=True)
-            self._bench.subject.mark("beside")  # the first node starts the executor's threads
-            self._end.now_s = 0.0
+        if self._present is None or self._present[0] is not task or fresh or new_session:
+            before, self._present = self._present, None
+            if before and not new_session and before[0].threads == task.threads:
+                self._bench.subject.stop(before[0].node)
+            else:
+                self._bench.subject.open(threads=task.threads, sim_time=True)
+                self._bench.subject.mark("beside")  # the first node starts the executor's threads
+                self._end.now_s = 0.0
             self._present = task, ClockBoundNode(self._bench, task, self._end, self._still)
         return self._present[1]
 

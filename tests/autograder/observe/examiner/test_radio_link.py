@@ -9,8 +9,8 @@ import pytest
 
 from autograder.examination.check_context import CheckContext
 from autograder.examination.exam import NotExaminable
-from autograder.observe.quiet_node import QuietNode
-from autograder.observe.radio_link import _own_ports, open_radio_link
+from autograder.observe.examiner.quiet_node import QuietNode
+from autograder.observe.examiner.radio_link import _own_ports, open_radio_link
 from course import Session
 
 
