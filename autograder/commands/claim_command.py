@@ -19,7 +19,7 @@ from autograder.assignments.intake.handed_files.handed_in import (
     look_through,
 )
 from autograder.assignments.submission import MAX_NOTEBOOK_BYTES
-from autograder.gradebook.nbgrader_plugins import autograde_steps as bridge
+from autograder.gradebook.nbgrader_plugins import autograde_steps
 from quizzes.attempts import record
 
 
@@ -81,7 +81,7 @@ def _claimable_files(root: Path, assignment: str) -> dict[str, str]:
         )
     found = {path.stem: path.name for path in notebooks}
     for path in notebooks:
-        for quiz in quiz_cells.in_cells(bridge.read_source(path)):
+        for quiz in quiz_cells.in_cells(autograde_steps.read_source(path)):
             found[f"{quiz_cells.PREFIX}{quiz}"] = record.attempts_filename(quiz)
     return found
 

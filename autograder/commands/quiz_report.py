@@ -14,7 +14,7 @@ from autograder.assignments.intake import attempts_search
 from autograder.assignments.intake.handed_files.file_names import normalise_name
 from autograder.commands.quiz_command import QuizCommandError, as_course_errors
 from autograder.gradebook.course_gradebook import CourseGradebook, GradebookError
-from autograder.gradebook.nbgrader_plugins import autograde_steps as bridge
+from autograder.gradebook.nbgrader_plugins import autograde_steps
 from quizzes.attempts import record, sharing
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def assignment_of(root: Path, name: str) -> str:
         return name
     having = sorted({
         path.parent.name for path in source.glob("*/*.ipynb")
-        if name in quiz_cells.in_cells(bridge.read_source(path))
+        if name in quiz_cells.in_cells(autograde_steps.read_source(path))
     })  # fmt: skip
     if len(having) > 1:
         raise QuizCommandError(

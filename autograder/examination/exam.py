@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType, TracebackType
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar, runtime_checkable
 
+from autograder.examination import not_checked
 from autograder.examination import points as points_table
 from autograder.examination.check_context import CheckContext, StudentError, SubjectGone
 from autograder.examination.plain_programs import SlowProgramError
@@ -231,9 +232,9 @@ class Exam(Generic[RigT]):
                 self._examine_check(need, rig, bench, done, gone, deadline)
             missing = [done[need] for need in check.needs if not done[need].passed]
             if missing:
-                done[name] = _not_checked(check, missing[0])
+                done[name] = _not_checked(check, not_checked.needed_check(missing[0]))
             elif not deadline.seconds_left:
-                done[name] = _too_late(check)
+                done[name] = _not_checked(check, not_checked.time_was_up(SITTING_S))
             else:
                 assert rig is not None  # without one, what needs nothing has failed already
                 bench.steps.clear()
@@ -268,27 +269,8 @@ def _result_of(check: Check[RigT], status: Status) -> CheckResult:
     )  # fmt: skip
 
 
-def _not_checked(check: Check[RigT], missing: CheckResult) -> CheckResult:
-    title = missing.title.rstrip(".")
-    actual = f"This needs “{title}” first."
-    if missing.status in ("grader_error", "not_examined"):
-        actual = f"This needs “{title}”, which could not be examined here. It is not your fault."
-    return replace(_result_of(check, "not_checked"), actual=actual)
-
-
-def _too_late(check: Check[RigT]) -> CheckResult:
-    return replace(
-        _result_of(check, "not_checked"),
-        actual=f"What was examined before this took {SITTING_S:.0f} s in all: which of your "
-        "callbacks takes so long for each answer?",
-    )
-
-
-def _not_reached(check: Check[RigT], gone: CheckResult) -> CheckResult:
-    return replace(
-        _result_of(check, "not_checked"),
-        actual=f"Your program hung or ended in “{gone.title.rstrip('.')}”, and was gone by then.",
-    )
+def _not_checked(check: Check[RigT], reason: str) -> CheckResult:
+    return replace(_result_of(check, "not_checked"), actual=reason)
 
 
 def _run_check(check: Check[RigT], rig: Any, gone: list[CheckResult]) -> CheckResult:
@@ -308,7 +290,7 @@ def _run_check(check: Check[RigT], rig: Any, gone: list[CheckResult]) -> CheckRe
         return _student_failure(check, error)
     except SubjectGone as error:
         if gone:
-            return _not_reached(check, gone[0])
+            return _not_checked(check, not_checked.program_was_gone(gone[0]))
         gone.append(_student_failure(check, error))
         return gone[0]
     except (NotExaminable, SlowProgramError) as reason:

@@ -3,7 +3,7 @@
 Five outcomes are kept apart, because they mean different things to a student and an instructor:
 a check *passed*, *failed* (the behaviour was seen and was wrong), was *not checked* (something it
 needs had failed), was *not examined* (this machine cannot: a person decides), or ended in a
-*grader error* (our fault: never the student's).
+*grader error* (our fault: never the student's). `autograder.examination.exam` decides which it is.
 """
 
 from __future__ import annotations

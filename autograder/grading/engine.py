@@ -17,7 +17,7 @@ from autograder import sandbox
 from autograder.assignments.intake import roster
 from autograder.assignments.intake.roster import Roster
 from autograder.gradebook.course_gradebook import CourseGradebook
-from autograder.gradebook.nbgrader_plugins import autograde_steps as bridge
+from autograder.gradebook.nbgrader_plugins import autograde_steps
 from autograder.gradebook.safe_html import page_texts
 from autograder.grading.graded import Graded
 from autograder.grading.grading_run import GradingRun
@@ -34,8 +34,8 @@ from course.util.close_matches import is_it
 
 __all__ = ["AssignmentError", "BusyError", "Graded", "grade"]
 
-STAGED = f"{bridge.WORK_FOLDER}/staged"
-LOCK = f"{bridge.WORK_FOLDER}/engine.lock"
+STAGED = f"{autograde_steps.WORK_FOLDER}/staged"
+LOCK = f"{autograde_steps.WORK_FOLDER}/engine.lock"
 
 
 EXCLUDED = (
@@ -108,7 +108,7 @@ def grade(
     refused = [Graded(s, {}, problem=problem, entered=False) for s, problem in wrong.items()]
     refused += [Graded(s, {}, problem=EXCLUDED) for s in found if s in gradebook.excluded_students]
     found = [s for s in found if s not in gradebook.excluded_students]
-    store = OutcomeStore(root / bridge.WORK_FOLDER, trust=trust, hidden=[root])
+    store = OutcomeStore(root / autograde_steps.WORK_FOLDER, trust=trust, hidden=[root])
     with ExitStack() as stack:
         stack.enter_context(_lock_course(root))
         stack.callback(progress.end)

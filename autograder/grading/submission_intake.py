@@ -29,7 +29,7 @@ from autograder.examination.verdict import Status, Verdict
 from autograder.gradebook import staging
 from autograder.gradebook.course_gradebook import CourseGradebook, GradebookError
 from autograder.gradebook.feedback.feedback_page import INDEX
-from autograder.gradebook.nbgrader_plugins import autograde_steps as bridge
+from autograder.gradebook.nbgrader_plugins import autograde_steps
 from autograder.gradebook.nbgrader_plugins.nbgrader_speedups import FeedbackExporter
 from autograder.gradebook.quizzes import quiz_marks
 from autograder.gradebook.safe_html import allowed_html
@@ -99,13 +99,14 @@ class SubmissionIntake:
         self.assignment = assignment
         self.notebooks = notebooks
         self.root = gradebook.root
-        self.work_folder = self.root / bridge.WORK_FOLDER
+        self.work_folder = self.root / autograde_steps.WORK_FOLDER
         self._trust = trust
         self._class = gradebook.read_roster().known
         asked = questions.known_questions(gradebook.coursedir, assignment)
         self._marks = Marks(self.work_folder, assignment, asked)
         self._originals = {
-            name: bridge.read_originals(gradebook.coursedir, assignment, name) for name in notebooks
+            name: autograde_steps.read_originals(gradebook.coursedir, assignment, name)
+            for name in notebooks
         }
 
     def warm_up(self) -> None:
@@ -157,7 +158,7 @@ class SubmissionIntake:
             for cell, (why, command) in asked.items():
                 said = f"{why} Say it with `{command}`, or with --nothing in place of the file."
                 work.problems.append(said)
-                bridge.ask_about_cells(notebook, said, [cell])
+                autograde_steps.ask_about_cells(notebook, said, [cell])
             allowed_html.screen_texts(notebook, self._originals[name][1], Page())
             nbformat.write(notebook, staged / f"{name}.ipynb")  # type: ignore[no-untyped-call]
             yield replace(piece, marks=quizzes.verdicts)
@@ -191,12 +192,12 @@ class SubmissionIntake:
         with self.gradebook.open_gradebook() as book:
             self._marks.remember(book, work.student, copy)
         for name, outcome in work.outcomes.items():
-            bridge.prepared[self.assignment, work.student, name] = outcome
+            autograde_steps.prepared[self.assignment, work.student, name] = outcome
         try:
             self.gradebook.autograde(self.assignment, work.student)
         finally:
             for name in work.outcomes:
-                bridge.prepared.pop((self.assignment, work.student, name), None)
+                autograde_steps.prepared.pop((self.assignment, work.student, name), None)
         shutil.rmtree(self._staged_folder(work.student).parent, ignore_errors=True)
         staging.let_feedback_replace(copy, self.notebooks)
         with self.gradebook.open_gradebook() as book:
@@ -234,8 +235,8 @@ class SubmissionIntake:
         except UnclearError as error:
             work.problems.append(f"{error} {error.suggestion}")
             notebook, outcome = self._blank_notebook(name, str(error), "not_checked")
-            bridge.ask_about_cells(
-                notebook, f"{error} {error.suggestion}", bridge.graded_cells(notebook)
+            autograde_steps.ask_about_cells(
+                notebook, f"{error} {error.suggestion}", autograde_steps.graded_cells(notebook)
             )
         except SubmissionError as error:
             notebook, outcome = self._blank_notebook(name, str(error), "not_checked")
@@ -249,7 +250,7 @@ class SubmissionIntake:
             reason = f"{type(error).__name__}: {error}"
             notebook, outcome = self._blank_notebook(name, reason, "grader_error")
         else:
-            notebook.metadata[bridge.NOTES_KEY] = [*notes, *beside.notes]
+            notebook.metadata[autograde_steps.NOTES_KEY] = [*notes, *beside.notes]
             return notebook, NotebookRun(work, name, GradingJob(program, beside.files, self._trust))
         return notebook, NotebookRun(work, name, outcome=outcome)
 
@@ -271,7 +272,7 @@ class SubmissionIntake:
             )
             said = f"{name}, {', '.join(cells)}: {why} {suggestion}"
             work.problems.append(said)
-            bridge.ask_about_cells(notebook, said, cells)
+            autograde_steps.ask_about_cells(notebook, said, cells)
         return notebook, [*found.notes, *known.notes, *dict.fromkeys(doubts.values()), *notes]
 
     def _blank_notebook(
@@ -289,7 +290,7 @@ class SubmissionIntake:
         return roster.student_folder(self.root, student) / self.assignment
 
     def _staged_folder(self, student: str) -> Path:
-        return self.root / bridge.WORK_FOLDER / "staged" / student / self.assignment
+        return self.root / autograde_steps.WORK_FOLDER / "staged" / student / self.assignment
 
     def _autograded_folder(self, student: str) -> Path:
         return self.root / "autograded" / student / self.assignment
