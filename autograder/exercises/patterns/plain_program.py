@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 
 from autograder.examination.exam import NotExaminable
 from autograder.exercises.patterns import readings
@@ -18,6 +17,13 @@ MORE, LESS = 1.4, 0.7
 """Times what the task says from which on a time is too long, or a rate too high, or too low."""
 STANDS_S, COARSER_S = 15.0, 0.5
 """Seconds of the program's clock for which the aisle is blocked, and between two moments of it."""
+FAR = 50  # stations to drive; the drive is called off
+
+
+class ProgramRobot(Robot):
+    """The robot in a plain program; ``drive`` is the one that is under way."""
+
+    drive: Drive | None = None
 
 
 def _see_film(robot: Robot) -> None:
@@ -48,31 +54,31 @@ def _see_late_level(robot: Robot) -> None:
     readings.require_late_level(robot, level, MORE)
 
 
-@contextmanager
-def _under_way(robot: Robot) -> Iterator[Drive]:
-    with as_not_examinable():
-        robot.report(POSITION, max(1.0, robot.position))
-        drive = Drive(robot, int(robot.position) + 2)
-        drive.require_driving()
-        drive.leave_station()
-    with drive:
-        yield drive
-
-
-def _see_blocked_aisle(robot: Robot) -> None:
-    with _under_way(robot) as drive:
-        drive.robot.pass_time(STANDS_S, COARSER_S)
-        drive.require_no_further()
-
-
-def _see_stop(robot: Robot) -> None:
-    with _under_way(robot) as drive:
+def _drive_under_way(robot: ProgramRobot) -> Drive:
+    # One for both trials: a stop of an earlier drive that comes late would be taken for this one's.
+    if robot.drive is None or robot.drive.sent.is_done:
         with as_not_examinable():
-            over_ns = drive.sent.cancel(lambda: robot.speed == 0, MORE * STOPS_S, looking_s=0.0)
-        require_stopped_by(robot, over_ns, MORE * STOPS_S)
+            robot.report(POSITION, max(1.0, robot.position))
+            robot.drive = Drive(robot, int(robot.position) + FAR)
+            robot.drive.require_driving()
+            robot.drive.leave_station()
+    return robot.drive
 
 
-def _await_interface(robot: Robot, names: Iterable[str]) -> list[str]:
+def _see_blocked_aisle(robot: ProgramRobot) -> None:
+    drive = _drive_under_way(robot)
+    robot.pass_time(STANDS_S, COARSER_S)
+    drive.require_no_further()
+
+
+def _see_stop(robot: ProgramRobot) -> None:
+    drive = _drive_under_way(robot)
+    with as_not_examinable():
+        over_ns = drive.sent.cancel(lambda: robot.speed == 0, MORE * STOPS_S, looking_s=0.0)
+    require_stopped_by(robot, over_ns, MORE * STOPS_S)
+
+
+def _await_interface(robot: ProgramRobot, names: Iterable[str]) -> list[str]:
     """Wait for what can be used; return the trials of it, whose first word says what it is."""
     robot.found = Findings()
     await_patterns(robot)
@@ -82,7 +88,7 @@ def _await_interface(robot: Robot, names: Iterable[str]) -> list[str]:
 TRIALS = SteppedTrials(
     NODE,
     THREADS,
-    Robot,
+    ProgramRobot,
     {
         "camera": _see_film,
         "position": _see_position,
