@@ -115,6 +115,8 @@ def gripper_refuses(nodes: Nodes) -> None:
                 "When the gripper answered not the first try, but the second with success=False"
             )
         nodes.require_no_errors("refused")
+    if len(again.tries) < 2:  # that is another check's
+        nodes.discard_session()
 
 
 @EXAM.check(
@@ -131,7 +133,7 @@ def gripper_retries(nodes: Nodes) -> None:
     A hiccup is worth a second try. A client that tries for ever never tells anybody that the
     gripper is dead, and one that tries without pauses keeps it from recovering.
     """
-    node = nodes.node(GRIPPER_CLIENT, new_session=True)
+    node = nodes.node(GRIPPER_CLIENT)
     with node.served_by(ServiceServer, GRIPPER) as gripper:
         close = nodes.draws.flag("the grip without an answer")
         grip = gripper_client.give_up(node, gripper, close, stands_still=True)

@@ -58,6 +58,10 @@ class Nodes:
             self._present = task, ClockBoundNode(self._bench, task, self._end, self._still)
         return self._present[1]
 
+    def discard_session(self) -> None:
+        """Have the next node made in a new session: in this one, something is still under way."""
+        self._present = None
+
     def require_no_errors(self, *trials: str) -> None:
         """Require that nothing leaves a callback of the present node's.
 
