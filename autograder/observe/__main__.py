@@ -24,7 +24,7 @@ from autograder.observe.lifecycle.lifecycle_leaks import LifecycleLeaks
 from autograder.observe.lifecycle.lifecycle_manager import LifecycleManager
 from autograder.observe.lifecycle.node_lives import NodeLives
 from autograder.observe.lifecycle.observer import Observer
-from autograder.observe.lifecycle.process_usage import ObservedProcess
+from autograder.observe.lifecycle.process_holdings import ProcessHoldings
 from autograder.observe.lifecycle.stepped_rate import MessageCounter
 from autograder.observe.marks.mark_trace import Trace
 from autograder.observe.marks.mark_tracer import MarkTracer
@@ -59,7 +59,7 @@ DESCRIBED: dict[str, tuple[Any, ...]] = {
     ),
     "Nodes that hand on what they receive": (relays_of, ObservedRelays, hear_past, open_radio_link),
     "Plain programs, and what a process holds": (
-        ObservedProgram, NodeTrials, Bounds, served, ProgramObserver, ObservedProcess,
+        ObservedProgram, NodeTrials, Bounds, served, ProgramObserver, ProcessHoldings,
         require_flat, require_flat_lives,
     ),
     "Lives and states of a node": (

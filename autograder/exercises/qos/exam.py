@@ -41,7 +41,7 @@ from autograder.observe import Topic
 from autograder.observe.relays.endpoint_qos import is_reliable, require_endpoints
 from autograder.observe.relays.late_joiner import hear_past
 from autograder.observe.relays.observed_relays import relays_of
-from autograder.observe.sequence_faults import describe_fault, faulty_numbers
+from autograder.observe.relays.sequence_faults import describe_fault, faulty_numbers
 
 EXAM: Exam[SensorRig] = Exam("qos", relays_of(SENSORS, consumer=CONSUMERS))
 

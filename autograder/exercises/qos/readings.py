@@ -14,7 +14,7 @@ from typing import Any
 from sensor_msgs.msg import Image, Imu, LaserScan
 from std_msgs.msg import String
 
-from autograder.observe.relays.marks import Mark
+from autograder.observe.relays.marked_messages import Mark
 from autograder.observe.relays.observed_relays import ObservedRelays
 
 FAR_M = 2.0**30
@@ -25,7 +25,7 @@ OPEN, CLOSED = (math.inf, math.nan), (1.0, 1.0)
 
 @dataclass(frozen=True)
 class Sensor:
-    """One sensor of the exercise, and its readings: `autograder.observe.relays.marks` explains."""
+    """One sensor of the exercise, and its readings: `autograder.observe.relays.marked_messages` explains."""
 
     name: str
     topic: str

@@ -16,6 +16,7 @@ from autograder.exercises.qos.single_readings import (
     require_each_published,
     send_singles,
 )
+from autograder.observe.relays.sequence_faults import lost_phrase, numbers_phrase
 from autograder.observe.relays.slow_reader import (
     PROMPT_S,
     TRIES,
@@ -25,7 +26,6 @@ from autograder.observe.relays.slow_reader import (
     pause_consumer,
     too_busy,
 )
-from autograder.observe.sequence_faults import lost_phrase, numbers_phrase
 
 EVENTS = 100
 """Stop events in a long pause."""

@@ -13,7 +13,7 @@ from autograder.observe.patience import SETTLE_S
 from autograder.observe.relays.arrivals import Arrivals
 from autograder.observe.relays.endpoint_qos import lossless_profile, undemanding_profile
 from autograder.observe.relays.message_stream import LAG_S
-from autograder.observe.sequence_faults import (
+from autograder.observe.relays.sequence_faults import (
     describe_fault,
     faulty_numbers,
     numbers_phrase,

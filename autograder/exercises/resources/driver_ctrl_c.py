@@ -10,7 +10,7 @@ from autograder.examination.plain_programs import Life, Programs
 from autograder.exercises.resources.camera_program import GONE, KEPT_KIB, CameraProgram
 from autograder.exercises.resources.rig import DRIVER, RATE_HZ, CameraRig, new_device
 from autograder.observe.lifecycle.observer import ENDED_S
-from autograder.observe.lifecycle.process_usage import Usage, list_kept
+from autograder.observe.lifecycle.process_holdings import Usage, list_kept
 from autograder.observe.patience import SETTLE_S
 from autograder.observe.phrases import as_phrase
 from autograder.observe.programs.program_observer import Faults, require_no_fault

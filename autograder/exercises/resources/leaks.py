@@ -6,7 +6,7 @@ from autograder.exercises.resources.driver import Driver, attempt_start, start_d
 from autograder.exercises.resources.rig import DRIVER, PERIOD_S, STEP_S, CameraRig, new_device
 from autograder.observe.lifecycle.flat_rounds import require_flat
 from autograder.observe.lifecycle.observer import ENDED_S
-from autograder.observe.lifecycle.process_usage import Usage
+from autograder.observe.lifecycle.process_holdings import Usage
 
 PICTURES = 5
 """A life, of 64 KiB: who keeps them is known by their number."""

@@ -13,7 +13,7 @@ from autograder.exercises.resources.rig import MANAGED, RATE_HZ, CameraRig, new_
 from autograder.observe.lifecycle.lifecycle_leaks import memory_kept
 from autograder.observe.lifecycle.lifecycle_manager import LifecycleManager, find_lifecycle_node
 from autograder.observe.lifecycle.observer import ENDED_S
-from autograder.observe.lifecycle.process_usage import Usage, list_kept
+from autograder.observe.lifecycle.process_holdings import Usage, list_kept
 from autograder.observe.phrases import as_phrase
 from autograder.observe.programs.program_observer import Faults, require_no_fault
 

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from autograder.examination.exam import Failed
 from autograder.observe.lifecycle.node_lives import NodeLives
 from autograder.observe.lifecycle.observer import ENDED_S
-from autograder.observe.lifecycle.process_usage import Usage, list_growth
+from autograder.observe.lifecycle.process_holdings import Usage, list_growth
 from autograder.observe.patience import SETTLE_S
 from autograder.observe.phrases import as_phrase
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from rclpy.node import Node
 
-from autograder.observe.lifecycle.process_usage import ObservedProcess
+from autograder.observe.lifecycle.process_holdings import ProcessHoldings
 from autograder.observe.patience import IDLE_S, SETTLE_S, Patience
 from autograder.observe.stillness import Stillness
 from autograder.processes.outside.asking import Outside
@@ -47,7 +47,7 @@ class Observer:
     def __init__(self, session: CoreSession, outside: Outside, node: Node) -> None:
         """Look on through ``node``, which runs in ``session``."""
         self.session, self.outside, self.node = session, outside, node
-        self.process = ObservedProcess(outside)
+        self.process = ProcessHoldings(outside)
         self.requests = 0
         self._still = Stillness(outside)
         self._clients: dict[str, Any] = {}

@@ -10,7 +10,7 @@ from autograder.examination.exam import Failed, NotExaminable
 from autograder.examination.plain_programs import Program, Programs
 from autograder.observe.lifecycle.node_lives import NodeLives
 from autograder.observe.lifecycle.observer import ENDED_S, Observer
-from autograder.observe.lifecycle.process_usage import Usage, kept_each, list_kept
+from autograder.observe.lifecycle.process_holdings import Usage, kept_each, list_kept
 from autograder.observe.participants import node_of, of_others
 from autograder.observe.patience import SETTLE_S
 from autograder.observe.phrases import capitalize_first

@@ -12,7 +12,7 @@ from autograder.examination.check_context import CheckContext
 from autograder.examination.exam import Failed
 from autograder.observe.examiner.quiet_node import QuietNode
 from autograder.observe.relays.arrivals import Arrivals
-from autograder.observe.relays.marks import MarkedMessages
+from autograder.observe.relays.marked_messages import MarkedMessages
 from autograder.observe.relays.message_stream import LAG_S
 from autograder.observe.relays.observed_process import ObservedProcess
 from autograder.observe.relays.relay_path import RelayPath

@@ -15,7 +15,7 @@ from rclpy.time import Time
 from autograder.observe.examiner.publication_times import published_at, received_at
 from autograder.observe.relays.arrivals import Arrivals
 from autograder.observe.relays.endpoint_qos import TopicEnds, lossless_profile, undemanding_profile
-from autograder.observe.relays.marks import Mark, MarkedMessages
+from autograder.observe.relays.marked_messages import Mark, MarkedMessages
 from autograder.observe.relays.message_stream import UNLIMITED, MessageStream
 
 CLAIMED_NS = 100_000_000

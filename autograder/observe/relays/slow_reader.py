@@ -22,7 +22,7 @@ from autograder.observe.relays.message_stream import (
     hold_streams,
 )
 from autograder.observe.relays.observed_relays import KindT, ObservedRelays
-from autograder.observe.sequence_faults import numbers_phrase
+from autograder.observe.relays.sequence_faults import numbers_phrase
 
 LONGEST_S = 60.0
 """Seconds that a pause may take on a busy machine."""

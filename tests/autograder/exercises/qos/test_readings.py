@@ -12,7 +12,7 @@ from autograder.exercises.qos.readings import CAMERA, IMU, LIDAR, SENSORS, STOP,
 from autograder.observe.examiner.quiet_node import QuietNode
 from autograder.observe.examiner.spinner import Spinner
 from autograder.observe.relays.endpoint_qos import lossless_profile
-from autograder.observe.relays.marks import Mark
+from autograder.observe.relays.marked_messages import Mark
 from autograder.observe.relays.relay_path import RelayPath
 from course import Session
 

@@ -10,10 +10,10 @@ from autograder.observe.phrases import as_phrase
 from autograder.processes.outside.asking import Outside
 from autograder.processes.outside.process_usage import Usage
 
-__all__ = ["ObservedProcess", "Usage", "kept_each", "list_growth", "list_kept"]
+__all__ = ["ProcessHoldings", "Usage", "kept_each", "list_growth", "list_kept"]
 
 
-class ObservedProcess:
+class ProcessHoldings:
     """The subject, looked at from outside, with all processes that it has started."""
 
     def __init__(self, outside: Outside) -> None:

@@ -6,7 +6,7 @@ from itertools import accumulate
 
 import pytest
 
-from autograder.observe.lifecycle.process_usage import Usage, kept_each, list_growth, list_kept
+from autograder.observe.lifecycle.process_holdings import Usage, kept_each, list_growth, list_kept
 
 FIRST = Usage(10, 20, 100_000)
 MIB = 1024
