@@ -25,7 +25,7 @@ OPEN, CLOSED = (math.inf, math.nan), (1.0, 1.0)
 
 @dataclass(frozen=True)
 class Sensor:
-    """One sensor of the exercise, and its readings: `autograder.observe.relays.marked_messages` explains."""
+    """One sensor of the exercise: see `autograder.observe.relays.marked_messages`."""
 
     name: str
     topic: str
