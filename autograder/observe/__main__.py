@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 import sys
 from collections.abc import Iterator
 from typing import Any
@@ -118,7 +119,8 @@ def _signature(function: Any) -> str:
         for parameter in found.parameters.values()
         if parameter.name != "self"
     ]
-    return str(found.replace(parameters=kept, return_annotation=inspect.Signature.empty))
+    shown = str(found.replace(parameters=kept, return_annotation=inspect.Signature.empty))
+    return re.sub(r"<function (\S+) at 0x\w+>", r"\1", shown)
 
 
 if __name__ == "__main__":

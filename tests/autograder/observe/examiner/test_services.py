@@ -8,8 +8,9 @@ from typing import Any
 import pytest
 from std_srvs.srv import SetBool
 
-from autograder.observe import Service, ServiceServer
+from autograder.observe import Service
 from autograder.observe.examiner.quiet_node import QuietNode
+from autograder.observe.examiner.services import ServiceServer
 from course import Session
 
 GRIPPER = Service("gripper/set", SetBool)
