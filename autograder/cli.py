@@ -277,7 +277,7 @@ def mutate(
     """Make a student's small mistakes in an exemplar, one at a time, and list what passes its exam.
 
     What survives is a check that is missing, or changes nothing: then say why in the table
-    [equivalent] of the exercise's corpus/mutants.toml.
+    "equivalent" of the exercise's corpus/mutants.toml.
     """
     from autograder.corpus import mutate as mutating
 
