@@ -43,16 +43,16 @@ def test_an_exercise_has_20_points_half_of_them_for_checks_that_a_student_sees(e
 
 
 @pytest.mark.parametrize("exam", EXERCISES)
-def test_who_breaks_a_check_without_points_loses_those_of_another_beside_it(exam: str) -> None:
+def test_who_breaks_a_check_without_points_loses_those_of_another(exam: str) -> None:
     checks = exercises.load_exam(exam).checks
 
     def needs(name: str) -> set[str]:
         direct = checks[name].needs
         return {*direct, *(need for other in direct for need in needs(other))}
 
-    for part in EXERCISES[exam].parts.values():
-        lost_with = {need for name, points in part.items() if points for need in needs(name)}
-        assert {name for name, points in part.items() if not points} <= lost_with
+    worth = {name: n for part in EXERCISES[exam].parts.values() for name, n in part.items()}
+    lost_with = {need for name, number in worth.items() if number for need in needs(name)}
+    assert {name for name, number in worth.items() if not number} <= lost_with
 
 
 def test_grade_cells_are_named_by_exam_and_part() -> None:
