@@ -37,11 +37,22 @@ def use_root_if_any(root: Path | None) -> None:
     Raises:
         ContentError: what was named is none.
     """
+    if (found := root_if_any(root)) is not None:
+        exercise_folders.use_course(found)
+
+
+def root_if_any(root: Path | None) -> Path | None:
+    """As `course_root`; None where none was named and there is none here.
+
+    Raises:
+        ContentError: what was named is none.
+    """
     try:
-        use_root(root)
+        return course_root(root)
     except ContentError:
         if root is not None:
             raise
+        return None
 
 
 def course_root(root: Path | None) -> Path:

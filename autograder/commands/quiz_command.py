@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from autograder.commands.options import Root, course_root
+from autograder.commands.options import Root, root_if_any
 from autograder.util.terminal import Terminal
 from course.errors import CourseError
 
@@ -121,14 +121,9 @@ def schema(
 def _banks_folder(root: Path | None) -> Path | None:
     """Return the folder of the course's own banks; None if there is no course here."""
     from autograder.assignments.quiz_cells import BANKS
-    from course.workspace.content import ContentError
 
-    try:
-        return course_root(root) / BANKS
-    except ContentError:
-        if root is not None:
-            raise
-        return None
+    found = root_if_any(root)
+    return found / BANKS if found else None
 
 
 @contextmanager

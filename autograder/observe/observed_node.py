@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -581,15 +581,7 @@ def one_node(
     """
     task = Task(node, publishes, subscribes, serves, calls, parameters=parameters, threads=threads)
 
-    @contextmanager
-    def stage(bench: CheckContext) -> Iterator[Stage]:
-        made = Stage(bench, task)
-        try:
-            yield made
-        finally:
-            made.close()
-
-    return stage
+    return lambda bench: closing(Stage(bench, task))
 
 
 def _abridged(values: Sequence[Any]) -> str:

@@ -35,7 +35,7 @@ class Drive:
         station: the last one that the robot has come to since: what is reported before it has
             moved there is made up.
         goal: the station that was named.
-        sent: the goal at the side of whoever has sent it.
+        sent: the goal as its sender sees it.
     """
 
     def __init__(self, robot: Robot, goal: int) -> None:
@@ -68,7 +68,7 @@ class Drive:
     # The robot's way.
 
     @property
-    def place(self) -> str:
+    def place_phrase(self) -> str:
         """Where the robot is, and for how long, as a phrase."""
         stood_s = self.robot.elapsed_s - self._since_s
         stood = f", where it has been for {stood_s:.0f} s of the node's clock,"
@@ -110,7 +110,8 @@ class Drive:
         said = "nothing" if robot.speeds.last is None else f"{robot.speed:g} m/s"
         raise Failed(
             expected="The robot drives until it is there: hardware/speed is more than 0.",
-            actual=f"With the robot {self.place}, hardware/speed said {said}{robot.error_note()}.",
+            actual=f"With the robot {self.place_phrase}, hardware/speed said {said}"
+            f"{robot.error_note()}.",
         )
 
     def find_top_speed(self, limit: float) -> float:
@@ -129,17 +130,17 @@ class Drive:
             said = f"went up to {found:g} m/s" if found > limit else f"said {found:g} m/s"
             raise Failed(
                 expected=f"With max_speed at {limit:g} m/s{also}, the robot drives at that.",
-                actual=f"With the robot {self.place}, hardware/speed {said}.",
+                actual=f"With the robot {self.place_phrase}, hardware/speed {said}.",
             )
 
-    # What whoever sent it hears.
+    # What the sender hears.
 
     def require_going_on(self) -> None:
         """Require that the goal has not ended."""
         if self.sent.is_done:
             raise Failed(
                 expected="The goal ends when the robot is there; while it is held up, it waits.",
-                actual=f"With the robot {self.place}, it {self.sent.end_phrase}"
+                actual=f"With the robot {self.place_phrase}, it {self.sent.end_phrase}"
                 f"{self.robot.error_note()}.",
             )
 
@@ -192,5 +193,5 @@ class Drive:
                 expected="At each station the feedback tells all those that the robot has passed "
                 "so far, in that order: the list grows, and its last number is that station. Here "
                 f"it is {so_far}.",
-                actual=f"With the robot {self.place}, {said}{self.robot.error_note()}.",
+                actual=f"With the robot {self.place_phrase}, {said}{self.robot.error_note()}.",
             )

@@ -146,7 +146,7 @@ def require_stopped_by(robot: Robot, moment_ns: int, seconds: float) -> None:
 def _require_stop(drive: Drive, state: GoalState, needed: str) -> None:
     """Wait for the end of the goal, and for the robot to stand still, and stay so."""
     robot = drive.robot
-    drive.sent.require_end(state, needed, lambda: f"with the robot {drive.place}")
+    drive.sent.require_end(state, needed, lambda: f"with the robot {drive.place_phrase}")
     # Which of two messages comes first is the transport's affair: a stop may be under way.
     is_late = state == GoalState.SUCCEEDED and not robot.wait(lambda: robot.speed == 0, UNDER_WAY_S)
     told = robot.speed

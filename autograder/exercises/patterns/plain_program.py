@@ -28,7 +28,7 @@ class ProgramRobot(Robot):
 
 def _see_film(robot: Robot) -> None:
     is_on = await_publication(robot, robot.pictures, 0)
-    rate = readings.film(robot) if is_on else None
+    rate = readings.measure_pictures(robot) if is_on else None
     if rate is None or not rate.is_numbered:
         raise NotExaminable(NOT_SEEN)
     least, most = readings.PICTURES_HZ

@@ -31,7 +31,7 @@ MAX_NUMBERS = 12
 MAX_ANSWER_CHARS, MAX_SHOWN_CHARS = 1000, 200
 
 
-def film(robot: Robot) -> StreamRate | None:
+def measure_pictures(robot: Robot) -> StreamRate | None:
     """Let time pass; return at which rate pictures came, or None if none comes any more."""
     stretch = StreamStretch(robot, robot.pictures)
     stretch.run(FILM_S, sum(PICTURES_HZ) / 2)
@@ -40,7 +40,7 @@ def film(robot: Robot) -> StreamRate | None:
 
 def require_film(robot: Robot) -> None:
     """Require that pictures come at about the right rate."""
-    rate = film(robot)
+    rate = measure_pictures(robot)
     if rate is None:
         raise Failed(
             expected=SCENARIOS["camera"].needed, actual=f"No picture came{robot.error_note()}."
@@ -60,7 +60,7 @@ def require_content(robot: Robot) -> None:
 
 
 def require_position(robot: Robot, pattern: str, slack: float = 1.0) -> None:
-    """Require that whoever wants to know the position gets the one that was reported last.
+    """Require that the position that was reported last can be learnt in time.
 
     The hardware says no more of it: a callback may take its time over each report.
 
@@ -72,13 +72,13 @@ def require_position(robot: Robot, pattern: str, slack: float = 1.0) -> None:
     learn = ask_position if pattern == "service" else _overhear
     answer, is_right = "", False
 
-    def settled() -> bool:
+    def is_settled() -> bool:
         nonlocal answer, is_right
         answer, numbers = learn(robot)
         is_right = any(abs(number - robot.position) < CLOSE_M for number in numbers)
         return is_right or answer == "nobody answered"
 
-    robot.wait_stepping(settled, slack * POSITION_AGE_S)
+    robot.wait_stepping(is_settled, slack * POSITION_AGE_S)
     if not is_right:
         raise Failed(
             expected=SCENARIOS["position"].needed,
@@ -114,7 +114,7 @@ def ask_position(robot: Robot) -> tuple[str, list[float]]:
 
 
 def require_level(robot: Robot, level: float, slack: float = 1.0) -> None:
-    """Have the hardware report a battery level, and require that whoever listens learns it."""
+    """Have the hardware report a battery level, and require that a listener hears it."""
     age_s = slack * LEVEL_AGE_S
     robot.report(CHARGE, level)
     if not robot.wait_stepping(
@@ -129,7 +129,7 @@ def require_level(robot: Robot, level: float, slack: float = 1.0) -> None:
 
 
 def require_late_level(robot: Robot, level: float, slack: float = 1.0) -> str:
-    """Require that whoever joins late learns a battery ``level``; return how."""
+    """Require that a late joiner learns a battery ``level``; return how."""
     robot.report(CHARGE, level)
     return require_for_late_joiners(
         robot, robot.levels, lambda told: abs(told - level) < LEVEL_MARGIN, slack * LEVEL_AGE_S

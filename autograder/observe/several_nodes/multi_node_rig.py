@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager
 from typing import Any
 
 from autograder.examination.check_context import CheckContext, StudentError, SubjectGone
@@ -181,12 +181,4 @@ def several_nodes(
         >>> # In a check: ``nodes.node(talker).advance(1.0)``
     """
 
-    @contextmanager
-    def rig(bench: CheckContext) -> Iterator[Nodes]:
-        nodes = Nodes(bench, trials)
-        try:
-            yield nodes
-        finally:
-            nodes.close()
-
-    return rig
+    return lambda bench: closing(Nodes(bench, trials))

@@ -60,7 +60,7 @@ def require_for_late_joiners(
     is_right: Callable[[Any], bool],
     seconds: float,
 ) -> str:
-    """Require that whoever joins a topic late learns what was published last, without a change.
+    """Require that a late joiner of a topic learns what was published last, without a change.
 
     It is in the newest message that somebody hears who joins long after.
 

@@ -32,7 +32,7 @@ class SteppedGoal:
 
     Attributes:
         action: what it was sent to.
-        run: the goal at the side of whoever has sent it: its state, and its result.
+        run: the goal as its sender sees it: its state, and its result.
         feedback: what counts of the feedback messages so far.
     """
 
