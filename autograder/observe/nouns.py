@@ -54,6 +54,11 @@ class Service:
         """The full names of the services that it is made of: its own."""
         return [str(self)]
 
+    @property
+    def topics(self) -> list[str]:
+        """The full names of the topics that it is made of: none."""
+        return []
+
     def __str__(self) -> str:
         """Return its full name, as the graph has it."""
         return _full_name(self.name)
@@ -77,6 +82,11 @@ class Action:
     def services(self) -> list[str]:
         """The full names of the services that it is made of (ROS 2 design, "Actions")."""
         return [f"{self}/_action/{part}" for part in ("send_goal", "cancel_goal", "get_result")]
+
+    @property
+    def topics(self) -> list[str]:
+        """The full names of the topics that it is made of; its server publishes on them."""
+        return [f"{self}/_action/{part}" for part in ("feedback", "status")]
 
     def __str__(self) -> str:
         """Return its full name, as the graph has it."""

@@ -139,7 +139,10 @@ class ObservedNode:
     def _await_discovery(self) -> None:
         endpoints = {
             "publishers": [str(topic) for topic in self._task.subscribes],
-            "subscribers": [str(topic) for topic in self._task.publishes],
+            "subscribers": [
+                *(str(topic) for topic in self._task.publishes),
+                *(name for served in self._task.serves for name in served.topics),
+            ],
             "clients": [name for served in self._task.serves for name in served.services],
             "services": [str(service) for service in self._task.calls],
         }

@@ -31,6 +31,7 @@ from autograder.examination.subject.wall_waits import wall_waits
 from autograder.processes.channel import Channel, ChannelClosed
 from course.runtime.context.context import default_context_beside
 from course.runtime.core_session import CoreSession
+from course.runtime.requests.service_ends import count_known_clients, count_known_servers
 from course.runtime.teardown import destroy_leftovers
 
 MAX_VALUE_CHARS = 64 * 1024
@@ -226,7 +227,8 @@ class SubjectServer:
         node = self._nodes[request["name"]]
         counts = {
             "publishers": node.count_publishers, "subscribers": node.count_subscribers,
-            "services": node.count_services, "clients": node.count_clients,
+            "services": partial(count_known_servers, node),
+            "clients": partial(count_known_clients, node),
         }  # fmt: skip
         return {
             "counts": {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -13,6 +14,7 @@ from autograder.observe.examiner.services import Request, hold_requests
 from autograder.observe.graph.qos_refusal import find_refusal
 from autograder.observe.nouns import Action, Service, Task, Topic
 from autograder.observe.participants import of_others
+from course.runtime.requests.service_ends import count_known_clients, count_known_servers
 
 # What is offered meets every demand but that of a deadline, so a student's QoS is free.
 OFFERED = QoSProfile(
@@ -152,12 +154,16 @@ class ExaminerEnd(QuietNode):
         publishers = self.get_publishers_info_by_topic
         subscriptions = self.get_subscriptions_info_by_topic
         clients = [*task.calls, *task.uses]
+        servers_of, clients_of = (
+            partial(count_known_servers, self),
+            partial(count_known_clients, self),
+        )
         return [
             *((f"publisher on {t}", bool(of_others(publishers(str(t))))) for t in task.publishes),
             *((f"subscription to {t}", bool(of_others(subscriptions(str(t)))))
               for t in task.subscribes),
-            *((f"{s.kind} {s}", all(map(self.count_services, s.services))) for s in task.serves),
-            *((f"client of {s}", all(map(self.count_clients, s.services))) for s in clients),
+            *((f"{s.kind} {s}", all(map(servers_of, s.services))) for s in task.serves),
+            *((f"client of {s}", all(map(clients_of, s.services))) for s in clients),
         ]  # fmt: skip
 
     def unserved(self, topic: Topic) -> str:

@@ -29,6 +29,7 @@ from autograder.observe.participants import (
 from autograder.observe.patience import SETTLE_S, Patience
 from autograder.observe.stillness import Stillness
 from course.errors import WaitTimeout
+from course.runtime.requests.service_ends import reply_topic, request_topic
 from course.runtime.ros_names import full_name
 
 INFRASTRUCTURE = frozenset(
@@ -163,8 +164,8 @@ class _Endpoints:
         """Return a service, by the topics that ROS 2 makes of it; None if it does not count."""
         if name.endswith(_OTHER_SERVICES_OF_ACTION):
             return None
-        requests = self.read_topic(name, f"rq{name}Request", no_mangle=True)
-        replies = self.read_topic(name, f"rr{name}Reply", no_mangle=True)
+        requests = self.read_topic(name, request_topic(name), no_mangle=True)
+        replies = self.read_topic(name, reply_topic(name), no_mangle=True)
         types = [_service_type(end.type) for end in (*requests.readers, *requests.writers)]
         if not types or (requests.readers and types[0].startswith(_OF_EVERY_NODE)):
             return None

@@ -74,7 +74,7 @@ class ClockBoundNode(ObservedNode):
         made: Any = self._bench.session.run(lambda: server(served, lambda: self.now_s))
         self._server = made
         try:
-            self._await_seen({"services": served.services})
+            self._await_seen({"services": served.services, "publishers": served.topics})
             self.rest()
             yield made
         finally:

@@ -271,7 +271,7 @@ def test_the_committed_notebooks_are_in_step_with_their_sources() -> None:
     ("text", "says"),
     [
         ("exercises = ['qso']", r"ps2\.toml lists the exercise 'qso', .* Did you mean 'qos'\?"),
-        ("quizzes = ['midterm']", r"ps2\.toml lists the quiz 'midterm', .*: there is none"),
+        ("quizzes = ['midterm']", r"ps2\.toml lists the quiz 'midterm', .*\. There is none\."),
         ("exercises = 'qos'", r"ps2\.toml: exercises must be a list of names"),
         ("exercises = ['qos', 'qos']", "the notebook 'qos-design' would be there twice"),
         ("title = 'Two'", r"ps2\.toml has a 'title', which an assignment has not"),
