@@ -98,6 +98,8 @@ class ObservedNode:
         self._looked_at = Counter[str]()  # messages of each topic that were in a span
         self._answers: dict[Service, tuple[float, dict[str, Any]]] = {}
         end.forget()
+        self.rest()  # by now the answers to an earlier node's requests have been sent
+        end.disconnect()
         for service in task.calls:
             end.serve(service)
         self._name = bench.subject.start(task.node)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 import shutil
 import time
+from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +24,8 @@ from autograder.examination import points
 from autograder.gradebook.course_gradebook import Grade
 from autograder.gradebook.release import make_release
 from autograder.grading import engine
+from autograder.observe.examiner.spinner import Spinner
+from course import Session
 from tests.killing import Engine, fresh_copy
 from tests.left_out import leave_out
 from tests.machine import sandbox_problem
@@ -55,6 +59,20 @@ class Course:
         else:
             nbformat.write(notebook, path)
         return path
+
+
+@pytest.fixture
+def session() -> Iterator[Session]:
+    """A session of rclpy in this process."""
+    with Session() as session:
+        yield session
+
+
+@pytest.fixture
+def spinner(session: Session) -> Iterator[Spinner]:
+    """What runs the callbacks of an examiner's nodes, in that session's context."""
+    with closing(Spinner(session.context)) as spinner:
+        yield spinner
 
 
 @pytest.fixture(scope="session")

@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.service import Service as RosService
 
 from autograder.observe.examiner.actions import ActionClientEnd
 from autograder.observe.examiner.quiet_node import QuietNode
@@ -49,6 +50,7 @@ class ExaminerEnd(QuietNode):
         self._asking: dict[str, Any] = {}
         self._goals: dict[str, ActionClientEnd] = {}
         self._requests: dict[str, list[Request]] = {}
+        self._serving: list[RosService] = []
 
     def listen(self, topic: Topic) -> None:
         """Listen to a topic, with what its publishers offer: lossless wherever that is possible."""
@@ -87,22 +89,36 @@ class ExaminerEnd(QuietNode):
         """Forget what came so far, and answer what waits: it was another node's."""
         for heard in self._heard.values():
             heard.clear()
-        for (
-            publisher
-        ) in self._telling.values():  # it would hand a new node what it told the old one
-            self.destroy_publisher(publisher)
-        self._telling.clear()
         for requests in self._requests.values():
             for request in requests:
                 request.answer()
             requests.clear()
+
+    def disconnect(self) -> None:
+        """Take down all that an earlier node was told or asked through.
+
+        A publisher would hand a new node what it told the old one. And a new reader of a writer
+        that has said something before waits for what it is told to leave out: if that comes before
+        it knows the writer, it comes again with its first ACKNACK, 70 ms later (Fast DDS's
+        ``initialAcknackDelay``). By then simulated time has passed an answer's time-out.
+        """
+        for publisher in self._telling.values():
+            self.destroy_publisher(publisher)
+        for client in self._asking.values():
+            self.destroy_client(client)
+        for goals in self._goals.values():
+            goals.destroy()
+        for server in self._serving:
+            self.destroy_service(server)
+        for ends in (self._telling, self._asking, self._goals, self._requests, self._serving):
+            ends.clear()
 
     def serve(self, service: Service) -> None:
         """Play a service: each request waits until it is answered."""
         if service.name in self._requests:
             return
         requests = self._requests.setdefault(service.name, [])
-        hold_requests(self, service, requests, lambda: self.now_s)
+        self._serving.append(hold_requests(self, service, requests, lambda: self.now_s))
 
     def requests(self, service: Service) -> list[Request]:
         """Return the requests that came to a service which the examiner plays."""

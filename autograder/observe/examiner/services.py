@@ -8,6 +8,7 @@ from typing import Any
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import Executor
 from rclpy.node import Node
+from rclpy.service import Service as RosService
 from rclpy.task import Future
 
 from autograder.observe.examiner.quiet_node import QuietNode
@@ -46,7 +47,7 @@ class Request:
 
 def hold_requests(
     node: Node, service: Service, requests: list[Request], now_s: Callable[[], float]
-) -> None:
+) -> RosService:
     """Serve a service from a node; each request is added to ``requests``, and waits there.
 
     ``now_s`` tells the time of the node under test, in s.
@@ -60,7 +61,7 @@ def hold_requests(
         return await request.answered
 
     group = ReentrantCallbackGroup()
-    node.create_service(service.type, str(service), respond, callback_group=group)
+    return node.create_service(service.type, str(service), respond, callback_group=group)
 
 
 class ServiceServer(QuietNode):

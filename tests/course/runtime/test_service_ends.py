@@ -29,6 +29,10 @@ def test_the_topics_of_a_service_are_those_of_dds(session):
     node = session.run(Node, "arm")
     service = node.create_service(SetBool, "grip", lambda request, response: response)
     assert service.service_name == "/grip"
+    session.until(lambda: count_known_servers(node, "/grip"))
     for topic in request_topic("/grip"), reply_topic("/grip"):
-        ends = node.get_publishers_info_by_topic, node.get_subscriptions_info_by_topic
-        session.until(lambda topic=topic: any(end(topic, no_mangle=True) for end in ends))
+        counted = node.count_publishers, node.count_subscribers
+        assert [count(topic) for count in counted] == [0, 0]  # they are none of ROS's own
+        read = node.get_subscriptions_info_by_topic(topic, no_mangle=True)
+        written = node.get_publishers_info_by_topic(topic, no_mangle=True)
+        assert len([*read, *written]) == 1

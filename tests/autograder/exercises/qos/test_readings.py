@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import pytest
 from std_msgs.msg import String
@@ -17,19 +16,6 @@ from autograder.observe.relays.relay_path import RelayPath
 from course import Session
 
 RUN = 8_000_000
-
-
-@pytest.fixture
-def session() -> Iterator[Session]:
-    with Session() as session:
-        yield session
-
-
-@pytest.fixture
-def spinner(session: Session) -> Iterator[Spinner]:
-    spinner = Spinner(session.context)
-    yield spinner
-    spinner.close()
 
 
 @pytest.mark.parametrize("sensor", SENSORS, ids=lambda sensor: sensor.name)

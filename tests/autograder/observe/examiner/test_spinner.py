@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import pytest
 from std_msgs.msg import String
 
@@ -13,19 +11,6 @@ from autograder.observe.relays.endpoint_qos import lossless_profile
 from course import Session, WaitTimeout
 
 MANY = 3 * MOST_AT_ONCE
-
-
-@pytest.fixture
-def session() -> Iterator[Session]:
-    with Session() as session:
-        yield session
-
-
-@pytest.fixture
-def spinner(session: Session) -> Iterator[Spinner]:
-    spinner = Spinner(session.context)
-    yield spinner
-    spinner.close()
 
 
 def test_messages_come_in_order_whatever_a_callback_raises(

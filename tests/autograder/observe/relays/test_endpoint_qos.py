@@ -21,12 +21,6 @@ DURABLE = lossless_profile(DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 @pytest.fixture
-def session() -> Iterator[Session]:
-    with Session() as session:
-        yield session
-
-
-@pytest.fixture
 def examiner(session: Session) -> Node:
     return session.run(QuietNode, "examiner")
 

@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import pytest
 from rclpy.node import Node
 
 from autograder.observe.relays.message_stream import AHEAD, MessageStream, hold_streams
 from course import Session, WaitTimeout
-
-
-@pytest.fixture
-def session() -> Iterator[Session]:
-    with Session() as session:
-        yield session
 
 
 def test_it_ends_at_its_limit(session: Session) -> None:
