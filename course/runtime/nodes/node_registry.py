@@ -35,13 +35,17 @@ Factory = Callable[..., Node]
 
 @dataclass
 class RegisteredNode:
-    """A node that a session runs; ``held`` are those that it brought along, while it is paused."""
+    """A node that a session runs; ``held`` are those that it brought along, while it is paused.
+
+    ``apart`` says whether it is one of the session's own, see `Session.run_apart`.
+    """
 
     node: Node
     name: str
     key: Hashable
     factory: object
     executor: BackgroundExecutor
+    apart: bool = False
     paused: bool = False
     held: list[Node] = field(default_factory=list)
 
@@ -87,8 +91,12 @@ class NodeRegistry:
         threads: int,
         *,
         replace: bool = True,
+        purpose: str = "",
     ) -> Node:
-        """Make a node and spin it; see `Session.run` and, for ``replace=False``, `run_beside`."""
+        """Make a node and spin it in the executor for ``purpose``; see `Session.run`.
+
+        For ``replace=False`` see `run_beside`, for a purpose `run_apart`.
+        """
         argument_checks.check_factory(factory, args, kwargs)
         key = _make_key(factory, args, kwargs) if replace else None
         for entry in self.list_nodes():
@@ -113,9 +121,11 @@ class NodeRegistry:
             self.half_made.clear(lambda remains: remains.name == name)
         for callback in self.on_made:
             callback(node)
-        executor = self._pool.get_executor(threads)
+        executor = self._pool.get_executor(threads, purpose)
         with self._lock:
-            self._entries[node] = RegisteredNode(node, name, key, factory, executor)
+            self._entries[node] = RegisteredNode(
+                node, name, key, factory, executor, apart=bool(purpose)
+            )
             self._made_by[name] = factory
             executor.add_node(node)  # under the lock: a node without executor looks stolen
         return node
