@@ -284,8 +284,8 @@ check("qos", part="hidden")
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "qos-explanation-loss", "locked": false, "points": 0, "schema_version": 3, "solution": true}
 # ### BEGIN SOLUTION
-# The driver's writer keeps each frame until the consumer has acknowledged it, and sends it again when
-# the consumer says what it misses. DDS hands over in order, so newer frames wait for the old one: the
+# The driver: its writer keeps each frame until it is acknowledged, and sends it again when the
+# consumer says what it misses. DDS hands over in order, so newer frames wait for the old one: the
 # picture freezes, then plays the past, and the repairs take bandwidth from a link that is bad
 # already. The robot steers by what was there a second ago; without the repair the next frame is there
 # after 100 ms. A connection is reliable only if both sides ask for it: the driver can offer RELIABLE,

@@ -131,7 +131,7 @@ def test_every_graded_cell_of_the_course_has_its_own_name(course: Course) -> Non
     loss = found["qos-explanation-loss"]
     assert loss.text.startswith("A colleague wants to record")
     assert "2.5 points, or a\npart of these if" in loss.rules
-    assert loss.model.startswith("The driver's writer keeps each frame")
+    assert loss.model.startswith("The driver: its writer keeps each frame")
     assert all(q.model and "2.5 points" in q.rules for q in found.values() if q.written)
 
 
@@ -153,9 +153,9 @@ def test_a_waiting_answer_waits_at_the_top_in_the_total_and_at_its_place(
     graded_course: Path,
 ) -> None:
     text = page(graded_course, "bob", NOTEBOOK).text
-    assert text.count("A lost camera frame : waits for its mark (1 point)") == 1
-    assert text.count("A lost camera frame waits for its mark (1 point)") == 1
-    assert "5 answers wait for a mark and can add up to 5." in text
+    assert text.count("A lost camera frame : waits for its mark (2.5 points)") == 1
+    assert text.count("A lost camera frame waits for its mark (2.5 points)") == 1
+    assert "2 answers wait for a mark and can add up to 5." in text
     assert "qos-explanation" not in text
     assert "0.0" not in text.replace("10.0", "")
     model = questions.of_notebook(Course(graded_course).source, NOTEBOOK)["qos-explanation-loss"]
@@ -211,7 +211,7 @@ def test_a_new_mark_stands_on_the_pages_after_the_next_run(graded: Path) -> None
     for name in ("index", NOTEBOOK):
         text = page(graded, "cy", name).text
         assert "waits" not in text
-        assert re.search(r"A lost camera frame ?:? 0\.5 of 1 point", text)
+        assert re.search(r"A lost camera frame ?:? 1\.25 of 2\.5 points", text)
 
 
 def test_an_exercise_is_called_by_its_title() -> None:
