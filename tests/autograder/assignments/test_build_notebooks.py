@@ -313,7 +313,8 @@ def test_an_assignment_has_what_its_list_says_in_that_order(root: Path) -> None:
     built = build(root, points={"test": 3.0, **points.of_grade_cells()})
     assert [str(path.relative_to(root)) for path in built] == [
         "chapters/one.ipynb", "source/ps1/patterns.ipynb", "source/ps1/qos-design.ipynb",
-        "source/ps1/last.ipynb", "source/ps1/two.ipynb", "source/ps1/qos-design.svg",
+        "source/ps1/last.ipynb", "source/ps1/two.ipynb",
+        "source/ps1/patterns.svg", "source/ps1/qos-design.svg",
     ]  # fmt: skip
 
 
