@@ -76,14 +76,13 @@
 #         self.wheels.publish(command)
 #
 #
-# world = course.world("warehouse")  # stations 0 to 7 lie straight on
+# world = course.world("warehouse")  # the robot stands at station 1; straight on is the way to 8
 # course.run(Wires)
 # course.run(RobotInterface, threads=4)
 # ```
 #
-# Then use it as an operator would: `course.session().timeline(name)` shows messages,
-# `service(name)` and `action(name)` of the session are forms, `parameters(name of the node)` changes
-# its parameters. Drag something into the aisle while it drives.
+# Then use it as an operator would (see “Look inside”, below), and drag something into the aisle while
+# it drives.
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "patterns-fine-print", "locked": true, "schema_version": 3, "solution": false}
 # <details><summary>What exactly is examined</summary>
@@ -398,6 +397,11 @@ class RobotInterface(Robot):
 # what was observed, what was needed, and why that matters on a robot; `check("patterns", hint=2)` in
 # a cell of your own helps more, `hint=3` most. There are 20 points: 10 for these checks, 5 at grading
 # (2 of them for your choices), 5 for your two answers.
+#
+# **Look inside**, after `import course`: `course.run(RobotInterface, threads=4)`, and then use it as
+# an operator would. `course.session().service(name)` and `course.session().action(name)` are forms
+# for a service and an action, `course.session().timeline(name)` shows a topic's messages,
+# `course.session().parameters("robot_interface")` a node's parameters: whichever you chose.
 
 # %% nbgrader={"grade": true, "grade_id": "patterns-visible", "locked": true, "points": 0, "schema_version": 3, "solution": false}
 from autograder import check

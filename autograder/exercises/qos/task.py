@@ -251,8 +251,9 @@ class SensorConsumers(Relay):
 # cell of your own helps more, `hint=3` most. There are 20 points: 10 for these checks, 5 for checks
 # at grading, 5 for your two answers.
 #
-# **Look inside**: `course.session().qos_lab(offered=lidar_qos, requested=lidar_qos)` tries two
-# profiles on a late joiner, a slow reader and a lossy link. After `course.run(SensorDrivers)` and
+# **Look inside**, after `import course`:
+# `course.session().qos_lab(offered=lidar_qos, requested=lidar_qos)` tries two profiles on a late
+# joiner, a slow reader and a lossy link. After `course.run(SensorDrivers)` and
 # `course.run(SensorConsumers)`, `course.session().graph()` shows in red what DDS refuses to connect.
 
 # %% nbgrader={"grade": true, "grade_id": "qos-visible", "locked": true, "points": 0, "schema_version": 3, "solution": false}
