@@ -81,13 +81,13 @@ def build(
 
 PLACES = (
     "chapters/*.ipynb", "source/*/*.ipynb", "release/*/*.ipynb", "source/*/exercises/*/*",
-    "release/*/exercises/*/*",
+    "release/*/exercises/*/*", "source/*/*.svg", "release/*/*.svg",
 )  # fmt: skip
 """Where a course has what is built, and what was released of it."""
 
 
 def find_orphans(root: Path, built: Iterable[Path]) -> list[Path]:
-    """Return the notebooks and exams of a course that are none of those ``built``.
+    """Return the notebooks, exams and pictures of a course that are none of those ``built``.
 
     They lost their source.
 
@@ -177,7 +177,8 @@ def _build_files(
             yield folder / f"{file_name}.ipynb", to_text(notebook).encode()
             for file, content in quiz_sheets.of_notebooks(root, [notebook]).items():
                 yield folder / file, content
-        for file, content in listing.exam_files(assignment).items():
+        files = listing.exam_files(assignment) | listing.picture_files(assignment)
+        for file, content in files.items():
             yield folder / file, content
 
 

@@ -56,6 +56,22 @@ def exam_files(assignment: Assignment) -> dict[Path, bytes]:
     return {Path(name): content for name, content in files.items()}
 
 
+def picture_files(assignment: Assignment) -> dict[Path, bytes]:
+    """Return {path in the assignment's folder: content} of its exercises' pictures.
+
+    Each lies beside its exercise's notebook, under the notebook's name: ``NAME.svg``.
+
+    Raises:
+        ExerciseError: one of them cannot be read.
+    """
+    table = points.table()
+    found = {
+        Path(f"{table[exercise].notebook}.svg"): exercise_folders.read_picture(exercise)
+        for exercise in assignment.exercises
+    }
+    return {path: content for path, content in found.items() if content is not None}
+
+
 def assignment_names(root: Path) -> set[str]:
     """Return the names of the assignments that the course at ``root`` has texts for."""
     return _listed_names(root / ASSIGNMENTS)

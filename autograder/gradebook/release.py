@@ -30,10 +30,11 @@ class ReleaseError(CourseError):
 def make_release(root: Path, assignment: str) -> Path:
     """Write the student version of ``assignment`` to ``release/``; return its folder.
 
-    The release holds the notebooks, the questions of closed quizzes, the exams of the course's own
-    exercises, and nothing else. It is made beside the earlier one, with a copy of the gradebook,
-    and takes its place before the gradebook itself is changed; if that fails after all, the earlier
-    one stands again. So a release that fails leaves everything as it was.
+    The release holds the notebooks, the pictures of their exercises, the questions of closed
+    quizzes, the exams of the course's own exercises, and nothing else. It is made beside the
+    earlier one, with a copy of the gradebook, and takes its place before the gradebook itself is
+    changed; if that fails after all, the earlier one stands again. So a release that fails leaves
+    everything as it was.
 
     Args:
         root: the nbgrader course root.
@@ -173,10 +174,11 @@ def _check_source(root: Path, assignment: str) -> dict[Path, bytes]:
                 f"{name} marks a solution or hidden tests, and students would get it with the exam "
                 f"of its exercise: move it out of the folder {root / name.parent}."
             )
-    beside = quiz_sheets.of_notebooks(root, notebooks) | exams
+    pictures = listing.picture_files(listed) if listed is not None else {}
+    beside = quiz_sheets.of_notebooks(root, notebooks) | exams | pictures
     for name, content in beside.items():
         if not (folder / name).is_file() or (folder / name).read_bytes() != content:
-            of_what = "exercise" if name in exams else "quiz"
+            of_what = "exercise" if name in exams or name in pictures else "quiz"
             raise ReleaseError(
                 f"{folder / name} is not in step with the {of_what}: run `autograder build` first."
             )

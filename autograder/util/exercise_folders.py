@@ -6,6 +6,7 @@ A folder is an exercise if it has one of the first three of these, and its name 
 - ``exam.py``: the checks; other modules beside it are what only they need;
 - ``points.toml``: what each check and each written answer is worth;
 - ``objectives.toml``: what each of them shows about a learner;
+- ``picture.svg``: what its notebook shows at the top;
 - ``corpus/``: submissions with known verdicts; ``design.md``: what the checks are for.
 
 One course root at a time has its exercises among them: `use_course` and `of_course` say which.
@@ -20,7 +21,7 @@ from pathlib import Path
 from course.errors import CourseError
 
 TASK, EXAM, POINTS = "task.py", "exam.py", "points.toml"
-OBJECTIVES, CORPUS = "objectives.toml", "corpus"
+OBJECTIVES, PICTURE, CORPUS = "objectives.toml", "picture.svg", "corpus"
 FOLDER = "exercises"
 """The folder of a course root, and of an assignment that is handed out, with exercises."""
 
@@ -194,6 +195,20 @@ def kept_from_students(package: Path = PACKAGE) -> Iterator[Path]:
                 yield entry
     kept = (EVERY, TABLE, DEMO_CLASS, NEW_EXERCISE)
     yield from (package / path.relative_to(PACKAGE) for path in kept)
+
+
+def read_picture(name: str) -> bytes | None:
+    """Return the picture of an exercise that there is, as SVG; None if it has none.
+
+    Raises:
+        ExerciseError: it cannot be read.
+    """
+    try:
+        return (current_exercises().folders[name] / PICTURE).read_bytes()
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise _unreadable_error(error) from None
 
 
 def _unreadable_error(error: OSError) -> ExerciseError:

@@ -111,8 +111,9 @@ def _course_files(root: Path) -> dict[Path, bytes]:
     chapters = sorted((root / "chapters").glob("*.ipynb"))
     files = {Path(path.name): path.read_bytes() for path in chapters}
     files |= {path: text.encode() for path, text in student_versions(root).items()}
-    exams = [p for p in sorted((root / "source").glob("*/exercises/*/*")) if p.is_file()]
-    files |= {path.relative_to(root / "source"): path.read_bytes() for path in exams}
+    beside = [(root / "source" / path).with_suffix(".svg") for path in files]
+    beside += sorted((root / "source").glob("*/exercises/*/*"))
+    files |= {p.relative_to(root / "source"): p.read_bytes() for p in beside if p.is_file()}
     for sheet in sorted((root / "source").glob("*/quiz-*.questions.yaml")):
         pictures = sorted((sheet.parent / "assets").glob("*"))
         files |= {path.relative_to(root / "source"): path.read_bytes()

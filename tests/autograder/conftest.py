@@ -133,7 +133,7 @@ def mark_written_answers(course: Course, *students: str) -> None:
     with Gradebook(f"sqlite:///{course.root / 'gradebook.db'}") as book:
         for student, cell in itertools.product(students, points.table()["qos"].manual):
             entry = book.find_grade(cell, NOTEBOOK, ASSIGNMENT, student)
-            entry.manual_score, entry.needs_manual_grade = 0.5, False
+            entry.manual_score, entry.needs_manual_grade = 1.25, False  # half of what it is worth
         book.db.commit()
 
 

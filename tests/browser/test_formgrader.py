@@ -106,21 +106,24 @@ def test_an_instructor_grades_our_assignment_in_the_formgrader(
     expect(beside).to_have_count(len(EXPLANATIONS))
     for number, model in enumerate(models):
         expect(beside.nth(number)).to_contain_text(model.replace("`", ""))
-        expect(beside.nth(number)).to_contain_text("half a point if only a part")
-    *clicked, missed, half = EXPLANATIONS
+        expect(beside.nth(number)).to_contain_text("2.5 points, or a part of these")
+    full, part = EXPLANATIONS
     for cell in EXPLANATIONS:
         # The page asks for the marks after it was drawn; what is given before they came is lost.
         expect(frame.locator(f"#{cell}")).to_have_class(re.compile("needs_manual_grade"))
-    for cell in clicked:
-        answer(frame, cell).get_by_role("button", name="Full credit").click()
-    answer(frame, missed).get_by_role("button", name="No credit").click()
-    frame.locator(f"#{half}").fill("0.5")
-    frame.locator(f"#{half}").press("Tab")
-    given = {**dict.fromkeys(clicked, 1.0), missed: 0.0, half: 0.5}
-    until(
-        lambda: marks(course_root).items() >= given.items(),
-        60, lambda: f"the points did not reach the gradebook: {marks(course_root)}",
-    )  # fmt: skip
+
+    def await_marks(given: dict[str, float]) -> None:
+        until(
+            lambda: marks(course_root).items() >= given.items(),
+            60, lambda: f"the points did not reach the gradebook: {marks(course_root)}",
+        )  # fmt: skip
+
+    answer(frame, full).get_by_role("button", name="Full credit").click()
+    answer(frame, part).get_by_role("button", name="No credit").click()
+    await_marks({full: 2.5, part: 0.0})
+    frame.locator(f"#{part}").fill("1.5")
+    frame.locator(f"#{part}").press("Tab")
+    await_marks({full: 2.5, part: 1.5})
     for step in ("autograded", "release"):
         for path in (course_root / step).rglob("*.ipynb"):
             assert not any(model in path.read_text("utf-8") for model in models), path

@@ -1,7 +1,7 @@
 """Exercise 3: which communication pattern fits, chosen and built; judged by use.
 
-Every bound below is a sentence of the task. What is right in more than one way: the position as a
-service or as a topic, a parameter of the node or a service of its own, a battery level that is
+Every bound below stands in the task's fine print. What is right in more than one way: the position
+as a service or as a topic, a parameter of the node or a service of its own, a battery level that is
 durable, published again and again, or told whoever joins. The key of the choices is not here: it
 comes from the hidden cell.
 """
@@ -78,8 +78,8 @@ def choices_made(robot: Robot) -> None:
 @EXAM.check(
     needs=("node_starts",),
     hints=(
-        "Who produces the pictures, who looks at them, and who should wait for whom?",
-        "They come by themselves, whoever looks: a timer of the node sets the pace.",
+        "Do pictures come by themselves, at the right pace, and with something in them?",
+        "Nobody has to ask for them, and nobody waits: a timer of the node sets the pace.",
         "A timer callback every 0.1 s that hands out self.take_picture() under robot/camera, once "
         "for all who look.",
     ),
@@ -100,7 +100,7 @@ def camera_streams(robot: Robot) -> None:
 @EXAM.check(
     needs=("node_starts",),
     hints=(
-        "Where is the robot: at the start, or now?",
+        "Is whoever wants to know told anything at all, and is it where the robot is now?",
         "Read `self.position` at the moment when somebody asks, not before.",
         "Answer whoever asks, with success set to True and message to str(self.position); or tell "
         "everybody at least twice a second.",
@@ -138,7 +138,7 @@ def position_answered(robot: Robot) -> str:
 @EXAM.check(
     needs=("node_starts",),
     hints=(
-        "What does whoever changes a parameter need to hear back?",
+        "Which values are accepted, which are refused, and what is whoever asked told of that?",
         "declare_parameter gives your node all that it takes; a range or a callback refuses.",
         "declare_parameter('max_speed', 0.5, ParameterDescriptor(floating_point_range=[...])) with "
         "a FloatingPointRange from 0.1 to 1.0.",
@@ -179,7 +179,7 @@ def parameter_changes(robot: Robot) -> str:
 @EXAM.check(
     needs=("node_starts",),
     hints=(
-        "Who needs the battery level, and does each of them have to ask?",
+        "Does everybody who listens hear each new level, as a number from 0.0 to 1.0?",
         "Tell the level when it changes, or every second; BatteryState has a field for it.",
         "In charge_changed, hand out BatteryState(percentage=self.charge) under robot/battery, "
         "once for all who listen.",
@@ -225,7 +225,8 @@ def battery_late_joiner(robot: Robot) -> str:
 @EXAM.check(
     needs=("node_starts",),
     hints=(
-        "Which pattern has a goal, reports on the way, and an end?",
+        "Follow one drive: what are its sender and the motors told at its start, at each station, "
+        "and at its end; and who has to wait meanwhile?",
         "In a loop: drive, see at which station the robot is, report all so far, sleep a little.",
         "One callback does the whole drive: a report at each station, and at the end drive(0.0), "
         "goal_handle.succeed() and a Result with the stations passed.",
@@ -265,7 +266,8 @@ def in_next_drive(before: str) -> AbstractContextManager[None]:
 @EXAM.check(
     needs=("navigation_drives", "parameter_changes"),
     hints=(
-        "When does your node look at max_speed: when it starts, or when it drives?",
+        "Which speed do the motors get, and when does your node look it up: at its start, or for "
+        "each drive?",
         "Ask for the parameter's value anew for every goal.",
         "self.drive(self.get_parameter('max_speed').value) where the drive begins.",
     ),
@@ -302,7 +304,8 @@ def speed_takes_effect(robot: Robot) -> None:
 @EXAM.check(
     needs=("navigation_drives",),
     hints=(
-        "Who decides in an action server whether a goal may be cancelled?",
+        "Is the cancel accepted, do the motors stop at once, does the goal end, and does all else "
+        "go on?",
         "The default cancel callback rejects; and the loop has to look at is_cancel_requested.",
         "cancel_callback=lambda _: CancelResponse.ACCEPT; in the loop, when is_cancel_requested: "
         "drive(0.0), goal_handle.canceled(), return the result.",

@@ -51,7 +51,7 @@ SCENARIOS: dict[str, Scenario] = {
     "parameters": Scenario(
         "robot/max_speed",
         {"service": SET_PARAMETERS},
-        "Whoever changes max_speed hears whether the new value holds, or why it does not.",
+        "Whoever changes max_speed is told whether the new value was accepted, or why not.",
     ),
     "battery": Scenario(
         "robot/battery",

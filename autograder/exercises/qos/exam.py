@@ -1,6 +1,6 @@
 """Exercise 1: QoS profiles for camera, LIDAR, IMU and emergency stop, judged by their effect.
 
-Every bound below is a sentence of the task, so any design that keeps to the task passes: the
+Every bound below stands in the task's fine print, so any design that keeps to the task passes: the
 chapter's profiles, `qos_profile_sensor_data` for the sensors, deeper or shallower queues, one
 profile for both sides or two, a transient-local stop.
 """
@@ -57,7 +57,7 @@ READ_DURABILITY = "Chapter 5, “QoS profiles: durability”"
 
 @EXAM.check(
     hints=(
-        "Run the cell with your classes again: does it end without an error?",
+        "Read what was observed: did a constructor raise, or is a topic missing?",
         "Try it beside the check: `course.run(SensorDrivers)`, then `course.run(SensorConsumers)`.",
         "Both classes must be there under these names, and every topic under its name and type.",
     ),
@@ -98,8 +98,10 @@ def _check_flow(name: str, sensor: Sensor, readings: str) -> None:
     EXAM.check(
         needs=("nodes_start",),
         hints=(
-            "Compare what your publisher offers with what your subscription requests.",
-            "A subscription may ask for less than is offered, never for more.",
+            "Follow one reading: does the driver publish it at once and unchanged, and does DDS "
+            "connect the two ends?",
+            "What comes late or changed was kept or changed in your driver's callback. What never "
+            "comes: a subscription may ask for less than is offered, never for more.",
             "BEST_EFFORT never satisfies a RELIABLE request, nor VOLATILE a TRANSIENT_LOCAL one.",
         ),
         read="Chapter 5, “Experiment 2: two ends that do not fit”",
@@ -142,9 +144,11 @@ def camera_best_effort(rig: SensorRig) -> str:
 @EXAM.check(
     needs=("camera_flows",),
     hints=(
-        "Where do frames wait while the consumer is busy, and how many of them?",
-        "The depth of the subscription's KEEP_LAST is the length of that queue.",
-        f"KEEP_LAST with a depth of 1 to {CAMERA.most} keeps the picture live.",
+        "Where do frames wait, or get lost, on their way to your consumer's output?",
+        "They wait in the subscription's queue, as many as KEEP_LAST's depth, and in lists of your "
+        "own; they are lost where a callback leaves some out.",
+        f"KEEP_LAST with a depth of 1 to {CAMERA.most} keeps the picture live; a frame that looks "
+        "like the last one is one, too.",
     ),
     read=READ_HISTORY,
 )
@@ -162,8 +166,9 @@ def camera_newest(rig: SensorRig) -> None:
 @EXAM.check(
     needs=("lidar_flows",),
     hints=(
-        "How old is the oldest scan in a queue of depth 10, at 10 Hz?",
-        "Obstacle avoidance needs the latest scan; a few more do no harm.",
+        "Where do scans wait, or get lost, on their way to your consumer's output?",
+        "Obstacle avoidance needs the latest scan: a queue of depth 10 holds one that is 1 s old, "
+        "at 10 Hz. And it needs each kind: with open beams, and like the one before.",
         f"KEEP_LAST with depth 1 gives the latest scan only; up to {LIDAR.most} are accepted.",
     ),
     read=READ_HISTORY,
@@ -207,7 +212,7 @@ def _describe_practice(rig: SensorRig, sensor: Sensor) -> str:
 @EXAM.check(
     needs=("imu_flows",),
     hints=(
-        "Count how many readings come in while the consumer is busy for 50 ms, at 100 Hz.",
+        "Count what comes in at 100 Hz while the consumer is busy: what of it must come out?",
         "A queue that is too short drops part of the burst; an endless one replays the past.",
         f"KEEP_LAST with a depth of {BURST} to {IMU.most} fits; the chapter takes 10.",
     ),
@@ -237,17 +242,18 @@ def imu_burst(rig: SensorRig) -> str:
 @EXAM.check(
     needs=("stop_flows",),
     hints=(
-        "Which consumers can connect to a BEST_EFFORT publisher, and which cannot?",
-        "What a publisher offers must be at least what the most demanding subscriber requests.",
+        "Follow one press: does the driver publish it, once and nothing else, and who can listen?",
+        "What a publisher offers must be at least what the most demanding subscriber requests; and "
+        "the queue for the hardware must hold what comes in while the driver is busy.",
         "Offer RELIABLE on emergency/stop, and request it in your consumer too.",
     ),
     read=READ_RELIABILITY,
 )
 def stop_reaches_all(rig: SensorRig) -> None:
-    """An emergency stop reaches every consumer, whichever reliability it asks for.
+    """Every consumer can hear the emergency stop, and one that asks for RELIABLE misses none.
 
-    A safety node asks for RELIABLE, a logger on Wi-Fi perhaps for BEST_EFFORT: neither may miss a
-    stop. Only a RELIABLE offer serves both.
+    A safety node asks for RELIABLE, a logger on Wi-Fi perhaps for BEST_EFFORT: DDS must connect
+    both, and repair what is lost for the one that asks for it.
     """
     require_heard_by_all(rig)
     require_only_events(rig, STOP.topic)
@@ -261,9 +267,10 @@ def stop_reaches_all(rig: SensorRig) -> None:
 @EXAM.check(
     needs=("stop_reaches_all",),
     hints=(
-        "Which stop events are left if the consumer was busy while many came in?",
-        "KEEP_LAST(depth) throws the oldest away as soon as more than `depth` are waiting.",
-        "KEEP_ALL, or a depth of 100 as in the task, keeps every event.",
+        "Compare what came in with what your consumer handed on: what is missing, or there twice?",
+        "KEEP_LAST(depth) throws the oldest away as soon as more than `depth` are waiting, a "
+        "lifespan what gets old, a comparison with the last event what reads alike.",
+        "KEEP_ALL, or a depth of 100 as in the task, keeps every event: hand on each as it is.",
     ),
     read=READ_HISTORY,
 )
@@ -289,9 +296,10 @@ def stop_complete(rig: SensorRig) -> str:
 @EXAM.check(
     needs=("camera_flows", "lidar_flows", "imu_flows"),
     hints=(
-        "What does a node that starts late receive from a TRANSIENT_LOCAL publisher?",
-        "A map or a parameter is still true a minute later. Is a camera frame?",
-        "VOLATILE for camera, LIDAR and IMU.",
+        "Who hands an old reading to a node that starts late: DDS, or your driver itself?",
+        "A map or a parameter is still true a minute later, and TRANSIENT_LOCAL keeps it. Is a "
+        "camera frame?",
+        "VOLATILE for camera, LIDAR and IMU, and a driver that publishes each reading once.",
     ),
     read=READ_DURABILITY,
 )

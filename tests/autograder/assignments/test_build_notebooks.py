@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import nbformat
@@ -17,9 +18,12 @@ from autograder.assignments.build_notebooks import (
     to_text,
 )
 from autograder.examination import points
+from autograder.gradebook.safe_html import allowed_html
+from autograder.util import exercise_folders
 from course.errors import CourseError
 from course.workspace.content import content_root
 
+PICTURE_BYTES = 6 * 1024
 HEADER = """\
 # ---
 # jupyter:
@@ -263,8 +267,21 @@ def test_a_source_that_is_not_text_is_said(root: Path) -> None:
 def test_the_committed_notebooks_are_in_step_with_their_sources() -> None:
     root = content_root()
     built = build(root, check=True)
-    committed = [*root.glob("chapters/*.ipynb"), *root.glob("source/*/*.ipynb")]
+    patterns = ("chapters/*.ipynb", "source/*/*.ipynb", "source/*/*.svg")
+    committed = [path for pattern in patterns for path in root.glob(pattern)]
     assert sorted(committed) == sorted(built)
+
+
+def test_a_notebook_shows_the_picture_of_its_exercise_and_says_what_is_to_be_seen() -> None:
+    for name, entry in points.table().items():
+        picture = exercise_folders.read_picture(name)
+        text = exercise_folders.exercise_file(name, exercise_folders.TASK).read_text("utf-8")
+        shown = re.findall(rf"^# !\[(.{{20,}})\]\({entry.notebook}\.svg\)$", text, re.MULTILINE)
+        assert len(shown) == (picture is not None), name
+        if picture is not None:
+            assert len(picture) < PICTURE_BYTES, name
+            assert allowed_html.is_still(picture), name
+            assert b"<title>" in picture, name
 
 
 @pytest.mark.parametrize(
@@ -297,6 +314,7 @@ def test_an_assignment_has_what_its_list_says_in_that_order(root: Path) -> None:
     assert [str(path.relative_to(root)) for path in built] == [
         "chapters/one.ipynb", "source/ps1/patterns.ipynb", "source/ps1/qos-design.ipynb",
         "source/ps1/last.ipynb", "source/ps1/two.ipynb",
+        "source/ps1/patterns.svg", "source/ps1/qos-design.svg",
     ]  # fmt: skip
 
 

@@ -130,7 +130,7 @@ def test_canvas_gets_files_under_the_names_that_it_gave_with_what_the_names_say(
     text = "\n".join(cell.source for cell in notebook.cells)
     assert "17.5 of 20 points." in notebook.cells[0].source
     assert "Handed in 2 hours 5 minutes late" in notebook.cells[0].source
-    assert "**A lost camera frame: 0.5 of 1 point**" in text
+    assert "**A lost camera frame: 1.25 of 2.5 points**" in text
     assert "HIDDEN TESTS" not in text
     assert 'part="hidden"' not in text
     assert not any("nbgrader" in cell.metadata for cell in notebook.cells)

@@ -76,7 +76,7 @@ def test_marks_go_out_are_filled_in_and_come_back_into_grades_and_feedback(grade
     assert [row["student"] for row in rows] == ["bob", "cy", "'-dan", "ann"], (
         "who waits comes first"
     )
-    assert [row["points"] for row in rows] == ["", "", "0.5", "0.5"]
+    assert [row["points"] for row in rows] == ["", "", "1.25", "1.25"]
     assert rows[0]["name"] == "Bob <b>Bee"
     assert "eve" not in file.read_text("utf-8"), "an unreadable hand-in has no answer"
 
@@ -89,7 +89,7 @@ def test_marks_go_out_are_filled_in_and_come_back_into_grades_and_feedback(grade
 
     engine.grade(graded, ASSIGNMENT)
     text = page(graded, "bob", NOTEBOOK).text
-    assert f"{TITLE} : 1 of 1 point (with a comment)" in text
+    assert f"{TITLE} : 1 of 2.5 points (with a comment)" in text
     assert "=Right, but" in text
     again = autograder("marks", "import", str(file), "--root", str(graded), cwd=graded).stdout
     assert "0 marks entered, 3 as they were, 1 left blank." in again
@@ -140,7 +140,7 @@ def test_a_spreadsheet_may_write_a_name_in_the_other_form_of_unicode(graded: Pat
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (marked({"bob": "1.5"}), "1.5 points for bob, but there are 0 to 1"),
+        (marked({"bob": "3"}), "3 points for bob, but there are 0 to 2.5"),
         (marked({"bob": "-1"}), "-1 points for bob"),
         (marked({"bob": "nan"}), "'nan' is no number"),
         (marked({"bob": "one"}), "'one' is no number"),
@@ -190,8 +190,8 @@ def test_a_question_is_found_by_its_title_or_its_id_and_the_others_are_named(
     gradebook = CourseGradebook(course.root)
     for wanted in (CELL, TITLE.upper(), "camera"):
         assert answers.find_question(gradebook, ASSIGNMENT, wanted).grade_id == CELL
-    with pytest.raises(MarksError, match=r"can be several questions: .*-loss .*-stop"):
-        answers.find_question(gradebook, ASSIGNMENT, "a lost")
+    with pytest.raises(MarksError, match=r"can be several questions: .*-loss .*-depth"):
+        answers.find_question(gradebook, ASSIGNMENT, "explanation")
     with pytest.raises(MarksError, match=r"there are .*-loss \(A lost camera frame\)"):
         answers.find_question(gradebook, ASSIGNMENT, "naught")
 
@@ -204,10 +204,10 @@ def test_an_answer_to_be_looked_at_again_is_not_settled_by_a_file_that_nobody_fi
         book.db.commit()
     file = exported(graded)
     answers.enter_marks(CourseGradebook(graded), file)
-    assert entry(graded, "ann")[:2] == (0.5, True)
-    fill_in(file, marked({"ann": "0.5"}))
+    assert entry(graded, "ann")[:2] == (1.25, True)
+    fill_in(file, marked({"ann": "1.25"}))
     answers.enter_marks(CourseGradebook(graded), file)
-    assert entry(graded, "ann")[:2] == (0.5, False)
+    assert entry(graded, "ann")[:2] == (1.25, False)
 
 
 # The page

@@ -121,6 +121,7 @@ fails = ["is_lit"]
 says = { is_lit = "It said False." }
 splices = [{ old = "data=True", new = "data=False" }]
 """
+PICTURE = '<svg xmlns="http://www.w3.org/2000/svg"><title>A lamp</title></svg>'
 FILES = {
     "task.py": TASK, "exam.py": EXAM, "listener.py": LISTENER,
     "words.py": 'EXPECTED = "A True comes on /lamp."\n',
@@ -200,7 +201,9 @@ def test_it_is_built_beside_those_of_the_package_and_only_its_exam_is_handed_out
     assert build(root, check=True)
     assert "lamp" not in exercises.exercise_names(), "it is one of that course only"
     released = make_release(root, "lab1")
-    assert files_in(released) == {"lamp.ipynb", "qos-design.ipynb", *SHIPPED}
+    assert files_in(released) == {
+        "lamp.ipynb", "qos-design.ipynb", "qos-design.svg", *SHIPPED,
+    }  # fmt: skip
     text = "\n".join(path.read_text() for path in released.rglob("*") if path.is_file())
     assert "create_timer" not in text
     assert set(map(str, working_copy._course_files(root))) >= {f"lab1/{name}" for name in SHIPPED}
@@ -240,6 +243,33 @@ def test_what_is_handed_out_is_in_step_with_the_exercise(root: Path) -> None:
         build(root, check=True)
     with pytest.raises(ReleaseError, match=r"words\.py is not in step with the exercise"):
         make_release(root, "lab1")
+
+
+def test_its_picture_goes_with_its_notebook(root: Path) -> None:
+    picture = root / "exercises" / "lamp" / "picture.svg"
+    picture.write_text(PICTURE)
+    assert root / "source" / "lab1" / "lamp.svg" in build(root)
+    assert (make_release(root, "lab1") / "lamp.svg").read_text() == PICTURE
+    assert working_copy._course_files(root)[Path("lab1/lamp.svg")] == PICTURE.encode()
+
+    picture.write_text(PICTURE.replace("lamp", "bulb that is on"))
+    with pytest.raises(CourseError, match=r"Not in step.*source/lab1/lamp\.svg"):
+        build(root, check=True)
+    with pytest.raises(ReleaseError, match=r"lamp\.svg is not in step with the exercise"):
+        make_release(root, "lab1")
+    build(root)
+
+    picture.unlink()
+    with pytest.raises(CourseError, match=r"Without a source.*lab1/lamp\.svg.*release/lab1/lamp"):
+        build(root, check=True)
+    with pytest.raises(ReleaseError, match=r"lamp\.svg would be handed out to students"):
+        make_release(root, "lab1")
+
+
+def test_a_picture_that_cannot_be_read_is_one_sentence(root: Path) -> None:
+    (root / "exercises" / "lamp" / "picture.svg").mkdir()
+    with pytest.raises(ExerciseError, match=r"picture\.svg cannot be read \(Is a directory\)"):
+        build(root)
 
 
 @needs_sandbox

@@ -41,6 +41,12 @@ def released(root: Path) -> Path:
     return root / "release" / "ch05" / "qos-design.ipynb"
 
 
+def leaks(root: Path) -> list[str]:
+    picture = Path("qos-design.svg")
+    beside = {picture: exercise_folders.exercise_file("qos", exercise_folders.PICTURE).read_bytes()}
+    return find_leaks(root / "source" / "ch05", root / "release" / "ch05", beside)
+
+
 def change(path: Path, grade_id: str, text: str) -> None:
     notebook = read(path)
     [cell] = [
@@ -52,13 +58,13 @@ def change(path: Path, grade_id: str, text: str) -> None:
 
 def test_the_release_holds_no_solution_hidden_test_or_authoring_file(root: Path) -> None:
     folder = root / "release" / "ch05"
-    assert [path.name for path in folder.rglob("*")] == ["qos-design.ipynb"]
-    assert find_leaks(root / "source" / "ch05", folder) == []
+    assert sorted(path.name for path in folder.rglob("*")) == ["qos-design.ipynb", "qos-design.svg"]
+    assert leaks(root) == []
     text = "\n".join(cell.source for cell in read(released(root)).cells)
     assert "BEGIN" not in text
     source = read(root / "source" / "ch05" / "qos-design.ipynb")
     hidden = [found for cell in source.cells for found in REGION.findall(cell.source)]
-    assert len(hidden) == 7  # the solution, the hidden tests, five exemplary answers
+    assert len(hidden) == 4  # the solution, the hidden tests, two exemplary answers
     for region in hidden:
         assert region.strip() not in text
 
@@ -85,7 +91,7 @@ def test_a_working_copy_gets_byte_for_byte_what_nbgrader_releases(root: Path) ->
         ("qos-solution", "\n### BEGIN SOLUTION", "still marks"),
         (
             "qos-explanation-depth",
-            "\nestimator, too little to steer by the past.",
+            "\npause, and the controller steers by the past.",
             "qos-explanation-depth",
         ),
     ],
@@ -94,7 +100,7 @@ def test_a_leak_is_found_wherever_it_is(
     root: Path, grade_id: str, text: str, says: str | None
 ) -> None:
     change(released(root), grade_id, text)
-    [found] = find_leaks(root / "source" / "ch05", root / "release" / "ch05")
+    [found] = leaks(root)
     assert (says or grade_id) in found
 
 
@@ -102,9 +108,9 @@ def test_files_too_many_or_too_few_are_found(root: Path) -> None:
     folder = root / "release" / "ch05"
     (folder / "notes").mkdir()
     (folder / "notes" / "qos-design.py").touch()
-    assert find_leaks(root / "source" / "ch05", folder) == ["it holds the file notes/qos-design.py"]
+    assert leaks(root) == ["it holds the file notes/qos-design.py"]
     shutil.rmtree(folder)
-    assert find_leaks(root / "source" / "ch05", folder) == ["qos-design.ipynb is missing from it"]
+    assert leaks(root) == [f"qos-design.{kind} is missing from it" for kind in ("ipynb", "svg")]
 
 
 def test_outputs_are_found(root: Path) -> None:
@@ -112,7 +118,7 @@ def test_outputs_are_found(root: Path) -> None:
     cell = next(cell for cell in data["cells"] if cell["cell_type"] == "code")
     cell["outputs"] = [{"output_type": "stream", "name": "stdout", "text": ["42"]}]
     released(root).write_text(json.dumps(data), encoding="utf-8")
-    [found] = find_leaks(root / "source" / "ch05", root / "release" / "ch05")
+    [found] = leaks(root)
     assert found.endswith("has outputs")
 
 

@@ -126,14 +126,13 @@ def test_everything_on_the_index_page_is_escaped_and_nothing_is_loaded() -> None
 def test_every_graded_cell_of_the_course_has_its_own_name(course: Course) -> None:
     found = questions.of_notebook(course.source, NOTEBOOK)
     assert [question.title for question in found.values()] == [
-        "Checks in the notebook", "Checks at grading", "A lost camera frame", "A lost stop event",
-        "Durability", "History and depth", "Compatibility",
+        "Checks in the notebook", "Checks at grading", "A lost camera frame", "History and depth",
     ]  # fmt: skip
     loss = found["qos-explanation-loss"]
-    assert loss.text.startswith("Who re-sends it")
-    assert "half a point if" in loss.rules
-    assert loss.model.startswith("Nobody: the camera is best effort")
-    assert all(q.model and "half a point" in q.rules for q in found.values() if q.written)
+    assert loss.text.startswith("A colleague wants to record")
+    assert "2.5 points, or a\npart of these if" in loss.rules
+    assert loss.model.startswith("The driver: its writer keeps each frame")
+    assert all(q.model and "2.5 points" in q.rules for q in found.values() if q.written)
 
 
 def test_a_release_has_no_model_answer_and_headings_of_students_name_nothing(
@@ -144,7 +143,7 @@ def test_a_release_has_no_model_answer_and_headings_of_students_name_nothing(
     cell.source = "# My own heading\n\n```\n# not one either\n```"
     found = questions.of_notebook(released, NOTEBOOK)
     assert not any(question.model for question in found.values())
-    assert found["qos-explanation-stop"].title == "A lost stop event"
+    assert found["qos-explanation-depth"].title == "History and depth"
 
 
 # Really graded
@@ -154,9 +153,9 @@ def test_a_waiting_answer_waits_at_the_top_in_the_total_and_at_its_place(
     graded_course: Path,
 ) -> None:
     text = page(graded_course, "bob", NOTEBOOK).text
-    assert text.count("A lost camera frame : waits for its mark (1 point)") == 1
-    assert text.count("A lost camera frame waits for its mark (1 point)") == 1
-    assert "5 answers wait for a mark and can add up to 5." in text
+    assert text.count("A lost camera frame : waits for its mark (2.5 points)") == 1
+    assert text.count("A lost camera frame waits for its mark (2.5 points)") == 1
+    assert "2 answers wait for a mark and can add up to 5." in text
     assert "qos-explanation" not in text
     assert "0.0" not in text.replace("10.0", "")
     model = questions.of_notebook(Course(graded_course).source, NOTEBOOK)["qos-explanation-loss"]
@@ -212,7 +211,7 @@ def test_a_new_mark_stands_on_the_pages_after_the_next_run(graded: Path) -> None
     for name in ("index", NOTEBOOK):
         text = page(graded, "cy", name).text
         assert "waits" not in text
-        assert re.search(r"A lost camera frame ?:? 0\.5 of 1 point", text)
+        assert re.search(r"A lost camera frame ?:? 1\.25 of 2\.5 points", text)
 
 
 def test_an_exercise_is_called_by_its_title() -> None:

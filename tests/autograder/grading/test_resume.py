@@ -161,7 +161,7 @@ def test_marks_that_a_person_gives_get_into_the_feedback(
     seen = again(course, fresh=True)
     assert seen.run == 3
     found = {g.student: g for g in CourseGradebook(course.root).read_grades(ASSIGNMENT)}
-    assert found["right"].score == class_.grades["right"].score + 2.5
+    assert found["right"].score == class_.grades["right"].score + 1.0
     assert not found["right"].needs_manual_grade, "the work is the same"
     course.submit("right", course.released)
     again(course)

@@ -23,6 +23,8 @@ WELCOME = Path("start-here.ipynb")
 SOURCE = content_root() / "source"
 NOTEBOOKS = sorted(path.relative_to(SOURCE) for path in SOURCE.glob("*/*.ipynb"))
 """Every notebook of an assignment; `EXERCISE` is one of them."""
+PICTURES = sorted(path.relative_to(SOURCE) for path in SOURCE.glob("*/*.svg"))
+"""Those that lie beside these."""
 CHAPTERS = sorted(Path(path.name) for path in (content_root() / "chapters").glob("*.ipynb"))
 """Every notebook that is none; `CHAPTER` and `WELCOME` are among them."""
 COMMAND = [sys.executable, "-c", "from course.command_line.launch import course; course()", "lab"]
@@ -64,9 +66,9 @@ def without_output(notebook: bytes) -> Any:
 
 def test_a_new_copy_has_the_chapters_and_the_student_versions(root: Path, folder: Path) -> None:
     copied = working_copy.make_copy(folder, root)
-    assert copied.new == [*CHAPTERS, *NOTEBOOKS]
+    assert copied.new == [*CHAPTERS, *NOTEBOOKS, *PICTURES]
     assert not copied.beside
-    assert set(everything(folder)) == {*CHAPTERS, *NOTEBOOKS, Path(MANIFEST)}
+    assert set(everything(folder)) == {*CHAPTERS, *NOTEBOOKS, *PICTURES, Path(MANIFEST)}
     exercise = (folder / EXERCISE).read_text(encoding="utf-8")
     assert "# Your work goes here." in exercise
     assert "BEGIN SOLUTION" not in exercise
@@ -110,7 +112,8 @@ def test_a_file_from_elsewhere_is_kept_and_a_deleted_one_comes_back(
     (folder / "ch05").mkdir(parents=True)
     (folder / EXERCISE).write_text("fetched elsewhere, and worked on")
     copied = working_copy.make_copy(folder, root)
-    assert copied.new == [*CHAPTERS, *(path for path in NOTEBOOKS if path != EXERCISE)]
+    others = [path for path in NOTEBOOKS if path != EXERCISE]
+    assert copied.new == [*CHAPTERS, *others, *PICTURES]
     assert copied.beside == {EXERCISE: Path("ch05/qos-design.new.ipynb")}
     assert (folder / EXERCISE).read_text() == "fetched elsewhere, and worked on"
     (folder / CHAPTER).unlink()

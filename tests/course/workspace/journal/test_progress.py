@@ -109,15 +109,15 @@ def test_what_was_run_checked_written_and_passed_counts(folder: Path) -> None:
     progress = course.progress(folder / "ch05")
     assert progress.chapters[0].done == 3
     exercise = progress.exercises[0].notebook
-    assert (exercise.written, exercise.to_write) == (0, 5)
+    assert (exercise.written, exercise.to_write) == (0, 2)
     text = repr(progress)
     assert "8 of 10 points (today, " in text
     assert "Still open: The newest comes first\n" in text
-    assert "Explanations: 0 of 5 written" in text
+    assert "Explanations: 0 of 2 written" in text
     journal.record_checks("qos", 10.0, 10.0, ["It starts.", "The newest comes first."], [])
-    write_explanations(folder / EXERCISE, "-explanation-stop")
+    write_explanations(folder / EXERCISE, "-explanation-depth")
     assert course.progress().exercises[0].is_done is False
-    assert "Explanations: 1 of 5 written" in repr(course.progress())
+    assert "Explanations: 1 of 2 written" in repr(course.progress())
     write_explanations(folder / EXERCISE)
     take_quiz(folder / QUIZ)
     progress = course.progress()
