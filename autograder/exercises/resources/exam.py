@@ -50,7 +50,8 @@ TAKES = 4
 @EXAM.check(
     hints=(
         "Try it beside the check: `course.run(CameraDriver)`, and then `course.logs()`.",
-        "Compare names and types of the four endpoints with the row “Running” of the table.",
+        "Compare what it does with the task: which topics and service, of which types? What starts "
+        "each picture, how long does a zoom hold, and when does a snapshot answer?",
         "Open Camera(device), start() it, publish read() from a 0.1 s timer; zoom() and a second "
         "read() belong in the callbacks of camera/zoom and camera/snapshot.",
     ),
@@ -148,7 +149,8 @@ def lives_are_flat(rig: CameraRig) -> None:
 @EXAM.check(
     needs=("camera_given_back",),
     hints=(
-        "Who may call destroy_node() besides you? A session does, and a test, and a `finally:`.",
+        "What has ended when destroy_node() returns for the first time, what does a second call "
+        "find, and what the next driver? A session calls it, and a test, and a `finally:`.",
         "Look at each line of your destroy_node(): what does it find when it runs again?",
         "Set what you have given back to None, and ask `is not None` before you give it back.",
     ),
@@ -240,7 +242,7 @@ def managed_runs(rig: CameraRig) -> None:
 @EXAM.check(
     needs=("managed_runs",),
     hints=(
-        "What still runs in your node between deactivate and activate?",
+        "Between deactivate and activate: what does your node still do, and what does it hold?",
         "A lifecycle publisher drops what is published while it is inactive: you do not see a "
         "timer that goes on, the camera does.",
         "Make the timer in on_activate; in on_deactivate destroy_timer() it, wait for a thread "
@@ -277,7 +279,8 @@ def silent_when_inactive(rig: CameraRig) -> None:
 @EXAM.check(
     needs=("managed_runs",),
     hints=(
-        "Compare what your on_configure makes with what your on_cleanup gives back.",
+        "What does a round from configure to cleanup read, make, and give back? Does the next one "
+        "begin as the first one did?",
         "Configured a second time, does your node use the new parameters, or those of the first?",
         "In on_cleanup close() the camera, destroy_lifecycle_publisher() the publisher, and set "
         "both to None; read the parameters in on_configure.",
@@ -307,8 +310,9 @@ def managed_gives_back(rig: CameraRig) -> None:
 @EXAM.check(
     needs=("managed_gives_back",),
     hints=(
-        "What does your on_configure return for a rate of 0 Hz, and for a camera that is missing?",
-        "FAILURE leads back to unconfigured. What had you opened by then?",
+        "What does your on_configure return for a rate or a camera that it cannot have, and what "
+        "has it opened by then?",
+        "FAILURE leads back to unconfigured, and closes nothing.",
         "Check the rate first (return FAILURE), open the camera in try (return FAILURE on "
         "OSError), and make the publisher last.",
     ),
@@ -367,7 +371,7 @@ def activation_error(rig: CameraRig) -> None:
 @EXAM.check(
     needs=("managed_gives_back",),
     hints=(
-        "From which states can a node be shut down? Which of your methods runs then?",
+        "From which states can a node be shut down, or destroyed? Which of your methods runs then?",
         "on_shutdown, and neither on_deactivate nor on_cleanup before it.",
         "Give everything back in on_shutdown as in on_cleanup, and in destroy_node() as well: look "
         "whether each thing is there before you give it back.",

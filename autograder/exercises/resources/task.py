@@ -13,58 +13,161 @@
 # %% [markdown] nbgrader={"grade": false, "grade_id": "resources-task", "locked": true, "schema_version": 3, "solution": false}
 # # Exercise 4: Resource management
 #
-# A delivery robot runs for weeks. Its camera driver does not: it is restarted after every update,
-# after every unplugged cable, and each time the robot changes between day and night mode. Whatever
-# one life of the driver leaves behind (an endpoint on the graph, a thread, an open device, memory)
-# is still there in the next life, and after some hundred lives the robot stands still.
+# ![One life of the camera driver after the other: a driver that leaks leaves a thread and two open files each time, one that cleans up leaves nothing](resources.svg)
 #
-# You write the driver twice: as a plain node that cleans up after itself, and as a managed
-# (lifecycle) node whose states say what it holds.
+# A robot's camera driver is restarted after every update and unplugged cable. What one life leaves
+# behind (a thread, an open device, memory) is still there in the next, until the robot stands
+# still. You write it twice, as a plain and as a managed (lifecycle) node. This takes about 90
+# minutes.
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "resources-must-do", "locked": true, "schema_version": 3, "solution": false}
+# ## What it must do
 #
-# The camera comes with a library, `Camera`, in the next cell. As with real devices, an open camera
-# is a descriptor of the process, it can be opened **once** at a time, and nobody closes it for you.
+# - **`CameraDriver(device)`** opens its camera and publishes 10 pictures a second on
+#   `camera/image`. A number on `camera/zoom` sets the zoom from then on; the service
+#   `camera/snapshot` publishes one more picture, then answers.
+# - **A start that fails** raises, and leaves nothing: no node, no thread, no open camera.
+# - **`destroy_node()`** gives everything back within 1 s, also when called twice, or while a
+#   callback waits for the camera. 50 lives leave no thread, no open file, and less than 100 KiB
+#   each.
+# - **`ManagedCamera()`** holds nothing when `unconfigured` or `finalized`, its open camera and its
+#   publisher when `inactive`, and streams only when `active`: `rate` pictures a second (above 0, up
+#   to 30).
+# - A configuration that is not possible leaves it `unconfigured`; a stream that does not start ends
+#   there or in `finalized`. A shutdown gives everything back, whatever the state.
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "resources-try-it", "locked": true, "schema_version": 3, "solution": false}
+# ## Try it
 #
-# ## The plain node: `CameraDriver(device='front')`
+# See what five lives leave behind, in a cell of your own, once you have run the cells of the plain
+# node. The stub leaves a thread and two open files each time. What does yours leave?
 #
-# | Phase | What it does |
-# |---|---|
-# | Initialization | Opens `Camera(device)` and starts its stream. If either raises, the constructor raises too, and leaves **nothing** behind: no node, no endpoint, no thread, no open camera, and less than 1 MiB of memory each time. Nobody calls `destroy_node()` on a node that was never made. The endpoints are there when the constructor returns. |
-# | Running | Publishes a picture on `camera/image` (`sensor_msgs/Image`) 10 times a second, one after the other, by a ROS timer or the node's clock: the examiner moves simulated time. One `std_msgs/Int32` on `camera/zoom` sets the zoom of all next pictures; a factor that the camera refuses costs that one message and nothing else (catch its `ValueError`: here a session goes on when a callback raises, but `rclpy.spin()` in a program of your own would end). The service `camera/snapshot` (`std_srvs/Trigger`) takes one picture at once, publishes it too, and answers with `success=True` when it has been published. |
-# | Cleanup | `destroy_node()` is the one door; rclpy, a session and the examiner all use it. After it no node and no endpoint of the driver is left on the graph, the camera is closed, and every thread of the driver has ended (within a second). It may be called twice, while the node spins, and while one of its callbacks is still waiting for the camera, which then ends, too. The driver can then be started again. |
+# ```python
+# import course
 #
-# Over 50 lives the process keeps its number of threads and open files, and grows by less than
-# 100 KiB a life; a life with many snapshots and refused zooms leaves no thread and no open file
-# either. A driver that takes long to start and end is given fewer of them.
+# for life in range(5):
+#     node = course.run(CameraDriver, f'front{life}')
+#     course.next_message(Image, 'camera/image')
+#     course.stop(node)
+#     print(threading.active_count(), 'threads,', len(os.listdir('/proc/self/fd')), 'open files')
+# ```
 #
-# ## The managed node: `ManagedCamera()`
+# `CameraDriver('stuck')`, in a cell of its own, is a start that fails. (`course.run` would hide a
+# leak there: it takes half-made nodes down for you.)
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "resources-fine-print", "locked": true, "schema_version": 3, "solution": false}
+# <details><summary>What exactly is examined</summary>
 #
-# An `rclpy.lifecycle.LifecycleNode` with two parameters, `device` (a string, `'front'`) and `rate`
-# (a double in Hz, `10.0`, allowed are values above 0 and up to 30). It publishes `camera/image` as
-# well, `rate` times a second; it has no zoom and no snapshot.
+# **Both nodes**
 #
-# | State | What it holds |
-# |---|---|
-# | `unconfigured` | Nothing: no camera, no publisher on `camera/image`. |
-# | `inactive` | The open camera and the publisher, with the parameters read when it was configured. The stream is stopped; the node sends no picture and asks the camera for none. |
-# | `active` | The stream and the timer as well; the pictures that it sends were taken since it was activated. |
-# | `finalized` | Nothing, wherever the shutdown came from. |
+# - **By what they do.** Another process starts and ends your nodes, drives the state machine over
+#   its services, listens on the wire, and looks from outside at the threads, open files and memory
+#   of your process. Nobody reads your code: worker threads or none, helper nodes, QoS and node
+#   names are your choice.
+# - **Time** is simulated, so pictures are timed by a ROS timer or by the node's clock. While it
+#   stands still none comes, but for snapshots. A rate is right if about as many come: one more or
+#   less in ten, three more or less at 30 Hz. It is counted up to three times, twice with time going
+#   on slowly.
+# - **An end within a second**: what is to be gone or closed is looked for as long as anything is at
+#   work in your process, up to 8 s. A busy machine is not held against you. A call of
+#   `destroy_node()` has 10 s.
+# - **Once more, in a plain program.** When your work is graded, your nodes also run in programs of
+#   rclpy that spin until Ctrl-C, and then call `destroy_node()` twice. The driver has four lives
+#   there. By the machine's clock it takes 10 pictures a second (6 to 16 do). After each life
+#   nothing of it is on the graph, its camera is closed, no thread and no file is left, and less
+#   than 1 MiB of memory. Beside the last life `CameraDriver('stuck')` is tried three times, which
+#   leaves nothing either (less than 1 MiB each), and last `CameraDriver('unplugged')` ends the
+#   program. The managed camera has three lives, each ended while it is active: at its `rate` (15 to
+#   25 Hz, 0.6 to 1.6 times as many do), with five rounds through its states that keep less than
+#   1 MiB each, and with nothing left after Ctrl-C, no helper node either. What is found counts in
+#   the check below that looks at the same.
 #
-# A configuration that is not possible (a rate out of bounds, a camera that cannot be opened) leaves
-# the node in `unconfigured`, without a further thread or open file, and with good parameters it can
-# then be configured. A stream that does
-# not start when the node is activated is an error: the node ends in `unconfigured` or `finalized`.
-# In each of these cases it holds what the table says, and every thread that it started has ended
-# when it is not active any more. `destroy_node()` gives everything back whatever the state, takes
-# the node off the graph, with every other node that it made, and may be called twice. Over ten
-# rounds from `unconfigured` to `active` and back the process keeps its number of threads and open
-# files, the graph its number of nodes, and a round costs less than 1 MiB of memory.
+# **The plain node**
 #
-# Your work is examined by what your nodes **do**. Another process starts and ends them, drives the
-# state machine over its services, listens on the wire, and looks from outside at the threads, open
-# files and memory of your process. How you write it is your choice.
+# - **It works** (all other checks of the plain node need that). When the constructor has returned
+#   there are a publisher on `camera/image` (`sensor_msgs/Image`), a subscription to `camera/zoom`
+#   (`std_msgs/Int32`) and a service `camera/snapshot` (`std_srvs/Trigger`), and the camera that it
+#   was told is open; without an argument that is `'front'`. 10 pictures a second come, one by one:
+#   in 0.1 s there is one. A snapshot may come between two of them at any time, and costs none.
+# - **Its snapshots.** Each is answered with `success=True` while time stands still, and publishes
+#   one picture that the camera has taken since it was asked for, and no second one (three
+#   snapshots, at most four pictures: one of the timer may be on its way). It need not overtake
+#   pictures that are being taken. The answer comes when its picture has been published.
+# - **Its zoom.** A factor from 1 to 8 holds for all next pictures, those of snapshots and the
+#   others (seen within 20 of them), until another one is sent. One message is enough.
+# - **Endpoints gone.** After one call of `destroy_node()`, with nobody who tidies up, no endpoint
+#   of the node is on the graph, not the node itself, and no other node that it has made.
+# - **Camera given back.** After `destroy_node()` the camera is closed; a driver that is started
+#   with the same device takes pictures.
+# - **Flat lives.** After a first life 25 are made, in which a few pictures are taken, and 25 more
+#   if the first have left something. Only what both have left counts: half a thread or half an open
+#   file a life, or 100 KiB of memory (what is less than 640 KiB in all does not count). This is
+#   measured in a session of the course, in which a bare `Node` costs about 2 KiB a life. (In plain
+#   rclpy it costs about 100 KiB: do not measure there.) If your lives take long, there are as many
+#   as fit into 2 s, but at least six, and memory then counts only if it goes on to grow in 24
+#   lives. One life with 20 snapshots leaves no thread and no open file.
+# - **Cleaned up twice.** `destroy_node()` is called twice while the node spins. Neither call
+#   raises, both return. The camera is closed, and every thread that was started in this life has
+#   ended, while the program still refers to the node. A next driver takes pictures.
+# - **A failed start.** `CameraDriver` raises for a device whose name begins with `unplugged` or
+#   `stuck`, and for one that is open already. (`SystemExit` will do.) Afterwards that camera is
+#   closed. Nobody has a node to call `destroy_node()` on, so the constructor does it: what it
+#   raised is kept, as a notebook keeps its last traceback, and a node that was not destroyed stays
+#   on the graph with it. After such starts, one that works, and its end, nothing is on the graph.
+#   Three such starts leave no thread and no open file (two of either count), and less than 1 MiB of
+#   memory each; memory counts only if three more leave it as well.
+# - **A refused zoom** (hidden). After a zoom above 8, of 0 and of -1 the next pictures have the
+#   zoom of before; then a zoom of 1 is followed, and the rate is right. 20 refused zooms leave no
+#   thread and no open file when the life is over. Catch the camera's `ValueError`: a session goes
+#   on when a callback raises, and so does the examination, but in a program of your own
+#   `rclpy.spin()` would end.
+# - **Cleaned up while busy** (hidden). With a camera that exposes for 0.3 s, `destroy_node()` is
+#   called while a callback waits for the picture of a snapshot. The camera is closed, nothing is on
+#   the graph, the callback ends, and the next driver follows a zoom. With a slow camera that is
+#   some pictures behind, `destroy_node()` does not wait for all of them: while it runs, at most
+#   five more are asked for.
 #
-# **20 points:** 10 for the visible checks, 5 for checks that run when your work is graded, 5 for
-# your explanations.
+# **The managed node**
+#
+# - **It works** (all other checks of the managed node need that). An
+#   `rclpy.lifecycle.LifecycleNode`. After “configure” the camera that its parameter `device` names
+#   is open. After “activate” 10 pictures a second come on `camera/image`, one by one; there is no
+#   zoom and no snapshot. “deactivate” and “cleanup” succeed.
+# - **Silent when inactive.** After “configure” and after “deactivate” the stream is stopped, and
+#   for 1 s the camera is asked for no picture. After “deactivate” the camera is still open and the
+#   publisher there. Nothing is published then, and after the next “activate” only pictures that
+#   were taken since, at the right rate. A picture that a slow camera was just taking at
+#   “deactivate” is not sent when that has succeeded.
+# - **Gives back.** Before the first “configure” there is no publisher on `camera/image`; the
+#   parameters are `device` (a string, `'front'`) and `rate` (a double, `10.0`). “configure” reads
+#   them: at 10 Hz, 30 Hz and one slow rate (1.5 to 4.5 Hz) the right number comes. What is set
+#   later holds from the next “configure” on, or is refused. After “cleanup” the camera is closed,
+#   and there is no publisher. Ten rounds from “configure” to “cleanup” leave no thread, no open
+#   file and no node (half of one a round counts), and less than 1 MiB of memory a round (more
+#   counts only if ten further rounds leave it as well). Every thread that “activate” started has
+#   ended after “deactivate”.
+# - **A refused configuration** (hidden). With a rate of 0, below 0, above 30 or of 1000 Hz, and
+#   with four unplugged cameras, the node is `unconfigured` after “configure”, the camera closed, no
+#   thread and no open file left. A node that refuses such a value already when it is set is right,
+#   too, and need not be configured then. Afterwards 0.5 Hz is configured, and then 10 Hz: pictures
+#   come, from one publisher.
+# - **A stream that does not start** (hidden). After “activate” with a camera `stuck` the node is
+#   `unconfigured` or `finalized`; so is one that finds out at “configure”. The camera is closed and
+#   there is no publisher. If it is unconfigured, the same is tried once more: then every thread
+#   that it started has ended, too, and with a good camera pictures come at the right rate.
+# - **Shut down** (hidden). After a shutdown from `unconfigured`, `inactive` and `active`, and after
+#   `destroy_node()` in each of these states, the camera is closed and there is no publisher; every
+#   thread that was started has ended (seen in `active`). A helper node that the node makes for a
+#   state goes with a shutdown as well. After `destroy_node()`, in `finalized`, too, no node and no
+#   endpoint is left, and a second call does not raise.
+#
+# </details>
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "resources-camera", "locked": true, "schema_version": 3, "solution": false}
+# ## Given: the camera
+#
+# `Camera` is the library of the camera's maker. As with real devices, an open camera is a
+# descriptor of the process, it can be opened **once** at a time, and nobody closes it for you.
 
 # %% nbgrader={"grade": false, "grade_id": "resources-given", "locked": true, "schema_version": 3, "solution": false}
 # %load_ext course
@@ -180,10 +283,9 @@ class Camera:
 # %% [markdown] nbgrader={"grade": false, "grade_id": "resources-your-work", "locked": true, "schema_version": 3, "solution": false}
 # ## The plain node
 #
-# The driver below takes pictures, and leaks everything that it opens: run the cell, then
-# `course.run(CameraDriver)` in a cell of your own, and then the same once more. The zoom and the
-# snapshot are missing. Reading a camera can block, so a worker thread does it; you may keep that,
-# or do it in another way.
+# The driver below takes pictures, and leaks everything that it opens; zoom and snapshot are
+# missing. Reading a camera can block, so a worker thread does it: you may keep that, or do it in
+# another way. If a factor is refused (`ValueError`), that costs one message and nothing else.
 
 # %% nbgrader={"grade": false, "grade_id": "resources-solution", "locked": false, "schema_version": 3, "solution": true}
 class CameraDriver(Node):
@@ -273,11 +375,11 @@ class CameraDriver(Node):
 # %% [markdown] nbgrader={"grade": false, "grade_id": "resources-your-lifecycle", "locked": true, "schema_version": 3, "solution": false}
 # ## The managed node
 #
-# The class below is a lifecycle node already: it goes through its states, and does nothing in any
-# of them. `rclpy.lifecycle.LifecycleNode` calls `on_configure`, `on_activate`, `on_deactivate`,
-# `on_cleanup`, `on_shutdown` and `on_error`, each with the state that it comes from. Each returns a
-# `TransitionCallbackReturn`: `SUCCESS`, `FAILURE` (back to where it came from) or `ERROR`, which an
-# exception means as well.
+# The class below goes through its states, and does nothing in any of them. rclpy calls
+# `on_configure`, `on_activate`, `on_deactivate`, `on_cleanup`, `on_shutdown` and `on_error`, each
+# of which returns a `TransitionCallbackReturn`: `SUCCESS`, `FAILURE` (back to where it came from)
+# or `ERROR`, which an exception means as well. Write an `on_error`, too: the one that you inherit
+# returns `SUCCESS`, and closes no camera.
 
 # %% nbgrader={"grade": false, "grade_id": "resources-lifecycle", "locked": false, "schema_version": 3, "solution": true}
 class ManagedCamera(LifecycleNode):
@@ -364,9 +466,10 @@ class ManagedCamera(LifecycleNode):
 # %% [markdown] nbgrader={"grade": false, "grade_id": "resources-how-to-check", "locked": true, "schema_version": 3, "solution": false}
 # ## Check it yourself
 #
-# The next cell starts an examiner in a process of its own. It takes a few seconds. For each check
-# it says what was observed, what was needed, and why it matters on a robot. Ask for more help with
-# `check("resources", hint=2)` or `hint=3` in a cell of your own.
+# The next cell starts an examiner in a process of its own, for ten seconds or so. It says for each
+# check what was observed, what was needed, and why that matters on a robot;
+# `check("resources", hint=2)` in a cell of your own helps more, `hint=3` most. There are 20 points:
+# 10 for these checks, 5 for checks at grading, 5 for your two answers.
 #
 # **Look inside**, in cells of your own after `import course` and `course.run(CameraDriver)`:
 # `course.session().diagnose()` names a callback that is stuck, with the line where it is, and
@@ -378,9 +481,8 @@ from autograder import check
 check("resources")
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "resources-about-hidden", "locked": true, "schema_version": 3, "solution": false}
-# The next cell is empty for you. When your work is graded, it examines the rest of the two tables:
-# a zoom that the camera refuses, a cleanup while the camera is busy, a configuration that is not
-# possible, a stream that does not start, and a shutdown from each state.
+# The next cell stays empty for you: when your work is graded, it examines what the fine print calls
+# hidden.
 
 # %% nbgrader={"grade": true, "grade_id": "resources-hidden", "locked": true, "points": 0, "schema_version": 3, "solution": false}
 # Filled in when your work is graded.
@@ -388,73 +490,42 @@ check("resources")
 check("resources", part="hidden")
 ### END HIDDEN TESTS
 
-# %% [markdown] nbgrader={"grade": false, "grade_id": "resources-question-initialization", "locked": true, "schema_version": 3, "solution": false}
+# %% [markdown] nbgrader={"grade": false, "grade_id": "resources-question-cleanup", "locked": true, "schema_version": 3, "solution": false}
 # ## Explain your choices
 #
-# Explain in two or three sentences each how your nodes manage their resources, and name places in
-# your own code. An instructor reads this: each answer gives one point, or half a point if only a
-# part of the question is answered.
+# Answer each question in three to five sentences. A person reads them: each gives 2.5 points, or a
+# part of these if only a part of the question is answered.
 #
-# ### Initialization
-#
-# What is created there, and what does the constructor do if a step in its middle fails?
-
-# %% [markdown] nbgrader={"grade": true, "grade_id": "resources-explanation-initialization", "locked": false, "points": 0, "schema_version": 3, "solution": true}
-# ### BEGIN SOLUTION
-# The endpoints, the worker thread and the camera's stream are made in `open()`. If a step raises,
-# the constructor calls `destroy_node()`, which works on half a node because `camera` and `worker`
-# exist (as `None`) before anything can fail, and then raises again: a process must learn that it
-# has no camera.
-# ### END SOLUTION
-
-# %% [markdown] nbgrader={"grade": false, "grade_id": "resources-question-running", "locked": true, "schema_version": 3, "solution": false}
-# ### Running
-#
-# Who may use the camera at which moment, and what must a callback that raises not leave behind?
-
-# %% [markdown] nbgrader={"grade": true, "grade_id": "resources-explanation-running", "locked": false, "points": 0, "schema_version": 3, "solution": true}
-# ### BEGIN SOLUTION
-# The timer only orders a picture, the worker reads it, so a slow camera never blocks the executor;
-# a snapshot reads beside it, as the camera may be used from several threads. A refused zoom is
-# caught in its callback; no lock is held there and nothing is half changed, so the next message is
-# handled as usual.
-# ### END SOLUTION
-
-# %% [markdown] nbgrader={"grade": false, "grade_id": "resources-question-cleanup", "locked": true, "schema_version": 3, "solution": false}
 # ### Cleanup
 #
-# In which order do thread, camera and endpoints end in your code, and what could happen in another
-# order?
+# In which order do thread, camera and endpoints end in your `destroy_node()`, and why? Take another
+# order: what could go wrong, and why might fifty lives not show it?
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "resources-explanation-cleanup", "locked": false, "points": 0, "schema_version": 3, "solution": true}
 # ### BEGIN SOLUTION
 # From the users to the used: first the worker ends and is waited for, then the camera is closed,
-# then rclpy destroys the endpoints. The other way round the worker would read from a closed camera
-# or publish with a destroyed publisher.
-# ### END SOLUTION
-
-# %% [markdown] nbgrader={"grade": false, "grade_id": "resources-question-leaks", "locked": true, "schema_version": 3, "solution": false}
-# ### Leaks
-#
-# How does a leak that one life does not show stop the robot after some hundred lives? Give an
-# example, and say where your code prevents it.
-
-# %% [markdown] nbgrader={"grade": true, "grade_id": "resources-explanation-leaks", "locked": false, "points": 0, "schema_version": 3, "solution": true}
-# ### BEGIN SOLUTION
-# A thread that nobody ends costs little, and one life does not show it. A robot that restarts its
-# driver every ten minutes has a thousand of them in a week; at some point a thread or a file cannot
-# be made any more, in a node that did nothing wrong. `destroy_node()` puts `END` into the queue and
-# joins the worker.
+# then rclpy destroys the endpoints. If the camera were closed first, the worker would read from a
+# closed one; if the endpoints went first, it would publish with a destroyed publisher. Either
+# happens only if the worker is at work in just that moment. In a short test it mostly waits for its
+# next order, so that fifty lives may all go well, and the robot meets the fifty-first at night.
 # ### END SOLUTION
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "resources-question-lifecycle", "locked": true, "schema_version": 3, "solution": false}
 # ### Lifecycle
 #
-# What does each state of your managed node hold, and what does a supervisor gain by that?
+# A robot has five drivers. What can a supervisor do with managed ones that it cannot do with plain
+# ones, and by which promise of which state? Name a node of a robot for which a plain one is enough,
+# and why.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "resources-explanation-lifecycle", "locked": false, "points": 0, "schema_version": 3, "solution": true}
 # ### BEGIN SOLUTION
-# Unconfigured holds nothing, inactive has the camera open with its stream stopped, active streams.
-# A supervisor can open all devices first, see that each is there, and let the robot drive only
-# then; and it can bring back a failed driver without ending its process.
+# A supervisor can configure all five first and see that each device is there before anything moves:
+# inactive promises an open device, its publisher, and silence. Then it activates them in order. It
+# can stop a sensor for a while without giving the device away (inactive), and bring back a failed
+# driver with new parameters without ending its process, because unconfigured promises that nothing
+# is held. A plain node is enough where there is nothing to open that can fail or that others wait
+# for: a node that only converts messages, or logs them, works as soon as it is there.
 # ### END SOLUTION
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "resources-hand-in", "locked": true, "schema_version": 3, "solution": false}
+# **Hand in**: save this notebook, and hand in the file `resources.ipynb` in the way of your course.

@@ -89,7 +89,7 @@ def gripper_answers(nodes: Nodes) -> None:
 @EXAM.check(
     needs=("gripper_answers",),
     hints=(
-        "What does `response.success` say?",
+        "Any try may be refused: what does your node publish then, and what does it not do?",
         "A refusal is an answer: leave the loop of tries, and command the arm to hold.",
         "On `success=False`: publish on arm/hold, then `refused` on grip/outcome, and return.",
     ),
@@ -122,9 +122,11 @@ def gripper_refuses(nodes: Nodes) -> None:
 @EXAM.check(
     needs=("gripper_answers",),
     hints=(
-        "Count: how many tries, how long until each is given up, how long the pauses in between?",
+        "Write down, second by second, what your node does when nobody answers: each try, each "
+        "pause, the arm, the word. And what of it is still under way at the next request?",
         "Loop over the pauses, such as 0.5 s and 1.0 s, on the node's clock; then give up.",
-        "After the third try without an answer: publish on arm/hold, then `failed`.",
+        "For each pause: `await sleep(self, pause)`, then a try of 1 s. After the third without an "
+        "answer: publish on arm/hold, then `failed`.",
     ),
 )
 def gripper_retries(nodes: Nodes) -> None:
@@ -181,7 +183,8 @@ def speed_serves(nodes: Nodes) -> None:
 @EXAM.check(
     needs=("speed_serves",),
     hints=(
-        "List what can be wrong with a name, with a type, and with a number.",
+        "Take the request that is named above: which line of yours meets it first, and what has "
+        "been changed by then?",
         "Comparisons with NaN are all false, so test for what is right, not for what is wrong.",
         "`if not 0.0 <= value <= highest:` refuses NaN too; answer with `reason`, set nothing.",
     ),
@@ -206,7 +209,8 @@ def speed_refuses(nodes: Nodes) -> None:
 
 @EXAM.check(
     hints=(
-        "There are two questions to an action server: did it accept, and how did it end?",
+        "Follow the goal that is named above: was it accepted, how did it end, and what did your "
+        "node do then, and once?",
         "`goal_handle.accepted` answers the first, `response.status` of the result the second.",
         "Only STATUS_SUCCEEDED is `arrived`. With any other word publish `Twist()` on cmd_vel.",
     ),
@@ -242,7 +246,7 @@ def goals_end(nodes: Nodes) -> None:
 @EXAM.check(
     needs=("goals_end",),
     hints=(
-        "What tells a slow navigator from one that hangs?",
+        "What tells a slow navigator from one that hangs, and what is to be done about each?",
         "Feedback is the sign of life: start a timer of 2 s at acceptance, and again with each.",
         "When it fires: `cancel_goal_async()`, a zero Twist, then `stalled`. Cancel it at the end.",
     ),
@@ -274,7 +278,8 @@ def goals_stall(nodes: Nodes) -> None:
 @EXAM.check(
     hints=(
         "Send a goal of your own: `course.send_goal(Drive, 'drive', Drive.Goal(order=2))`.",
-        "Reject bad orders in the goal callback: in `execute` it is too late, it was accepted.",
+        "The goal callback decides about the order: in `execute` it is too late to reject one. A "
+        "good goal is driven, told of and stopped there.",
         "For each metre a few times: command the wheels, `await sleep`, 1 s in all. Then feedback; "
         "at the end succeed, and stop.",
     ),
@@ -309,7 +314,8 @@ def drive_arrives(nodes: Nodes) -> None:
 @EXAM.check(
     needs=("drive_arrives",),
     hints=(
-        "Who decides whether a request to cancel is accepted, and who has to act on it?",
+        "Who decides whether a request to cancel is accepted, who has to act on it, and what is "
+        "left of the drive for the next goal?",
         "Accept it in the cancel callback, and look at `goal_handle.is_cancel_requested` often.",
         "In the loop: if requested, `goal_handle.canceled()` and return; `finally` stop wheels.",
     ),
@@ -337,7 +343,8 @@ def drive_cancels(nodes: Nodes) -> None:
 @EXAM.check(
     needs=("drive_arrives",),
     hints=(
-        "What happens to the robot between the exception and the end of `execute`?",
+        "Follow a jam: which command meets it, and how soon? Who catches what that raises, and "
+        "what is said and done before `execute` ends?",
         "Catch WheelError around the whole loop: say why on drive/fault, then abort the goal.",
         "`except WheelError as error:` publish it, `goal_handle.abort()`; `finally:` stop.",
     ),
@@ -369,7 +376,8 @@ def drive_aborts(nodes: Nodes) -> None:
 @EXAM.check(
     needs=("gripper_answers",),
     hints=(
-        "Your second try is out, and the answer to the first one arrives. Where does it end up?",
+        "A try's time is up, and then its answer arrives: in the pause, in the next try, or in the "
+        "next request. Where does it end up in your node?",
         "Each try has a future of its own. Forget the old one when its time is up.",
         "`future.cancel()` (or `client.remove_pending_request(future)`) when the 1 s is over.",
     ),
@@ -429,7 +437,8 @@ def gripper_stale(nodes: Nodes) -> None:
 @EXAM.check(
     needs=("gripper_answers",),
     hints=(
-        "What does your node do while it waits for a server that is not there?",
+        "What goes on in your node while nobody answers, or nobody is there: which tries, for how "
+        "long each, and does the heart's timer run?",
         "Waiting in a callback (`wait_for_service`, `call`, `time.sleep`) stops its whole group.",
         "Await futures and `sleep(node, ...)` in a reentrant group; the heartbeat's timer goes on.",
     ),
@@ -518,7 +527,8 @@ def speed_atomic(nodes: Nodes) -> None:
 @EXAM.check(
     needs=("goals_end",),
     hints=(
-        "Which futures of an action client may never be done?",
+        "A client waits for three answers: to the goal, of the drive, to the cancel. What does "
+        "your node do if one of them is no, late, or never comes?",
         "The goal's answer, the result and the cancel's answer: none of them may wait for ever.",
         "Cancel each future after its time, then `lost`; empty `goals_canceling` means `runaway`.",
     ),
@@ -587,7 +597,8 @@ def goals_lost(nodes: Nodes) -> None:
 @EXAM.check(
     needs=("drive_arrives",),
     hints=(
-        "Which of your lines run when somebody calls `shutdown()` in the middle of a drive?",
+        "Which of your lines run when somebody calls `shutdown()`, on the way or not, and which "
+        "may tell the wheels something after that?",
         "A stop alone does not last: the loop drives on. Tell the loop, too.",
         "Set a flag, and stop the wheels; the loop looks at the flag, aborts the goal, returns.",
     ),
