@@ -7,18 +7,15 @@ import json
 import threading
 import time
 from abc import ABC, abstractmethod
-from functools import cache
-from pathlib import Path
 from typing import Any, ClassVar
 
-import anywidget
-import traitlets
 from rclpy.exceptions import InvalidHandle
 
 from course.runtime.core_session import CoreSession
 from course.views.shared import truncate
+from course.views.shared.live_widget import LiveWidget, widget_class
 from course.views.shared.refresher import ticker_of
-from course.views.shared.static_fallback import saved_output
+from course.views.shared.saved_copy import SavedCopy
 from course.views.shared.view_registry import registry_of
 
 MIN_PERIOD_S = 0.1
@@ -38,28 +35,7 @@ MAX_WORDS_CHARS = 15_000
 
 CLOSED = "The session has been closed."
 
-_STATIC = Path(__file__).parents[1] / "static"
-
 Frame = dict[str, Any]
-
-
-class LiveWidget(anywidget.AnyWidget):
-    """The browser's end of a view. It draws `make_frame` and knows nothing of ROS.
-
-    Attributes:
-        frame: what to draw; JSON data.
-        words: the same as text, for screen readers.
-        ended: why nothing comes any more; empty while the view is live.
-        notice: what else should be known of what is shown.
-        number: counts frames; the browser sends back the number that it has drawn.
-    """
-
-    kind = traitlets.Unicode().tag(sync=True)
-    frame = traitlets.Dict().tag(sync=True)
-    words = traitlets.Unicode().tag(sync=True)
-    ended = traitlets.Unicode().tag(sync=True)
-    notice = traitlets.Unicode().tag(sync=True)
-    number = traitlets.Int().tag(sync=True)
 
 
 class LiveView(ABC):
@@ -95,6 +71,8 @@ class LiveView(ABC):
         self._drawn = 0
         self._stumbles = 0
         self._why = ""
+        self._seen_at = ""
+        self._copy = SavedCopy(self.label)
         self._looking = threading.RLock()
         registry_of(session).put(self, (type(self).__qualname__, repr(about)))
 
@@ -110,6 +88,15 @@ class LiveView(ABC):
         """Return both, of one and the same moment."""
         return self.make_frame(), self.words()
 
+    def picture(self) -> str:
+        """Return an SVG document of what was shown last, for a saved notebook; "" for none."""
+        return ""
+
+    @property
+    def standstill(self) -> str:
+        """Why the last look is not of now, as a sentence; empty if it is of now."""
+        return ""
+
     def handle_control(self, message: dict[str, Any]) -> None:  # noqa: B027 - some views have no controls
         """Do what a control in the browser asks for. Runs in the kernel's main thread."""
 
@@ -117,10 +104,10 @@ class LiveView(ABC):
     def widget(self) -> LiveWidget:
         """The widget that shows this view; made, and kept up to date, from its first use."""
         if self._widget is None:
-            self._widget = _widget_class((*self.shared, self.script))(kind=self.script)
+            self._widget = widget_class((*self.shared, self.script))(kind=self.script)
             self._widget.on_msg(self._on_message)
             self._refresh_widget()
-            self._widget.ended = self._why
+            self._widget.ended = self._end_text()
             if not self._why:
                 self._widget.observe(self._on_close, "comm")
                 self._widget.comm.on_close(self._on_close)
@@ -141,7 +128,13 @@ class LiveView(ABC):
             self._refresh_widget()
             slow = self._widget is not None and self._widget.number - self._drawn > PATIENCE
             self._due = time.monotonic() + (max(1.0, self.period) if slow else self.period)
+            if self._copy.is_due:
+                self._save_copy()
         return self._due
+
+    def take_last_look(self) -> None:
+        """Show what there is to see now, as it will soon be gone."""
+        self._refresh_widget()
 
     def end(self, why: str, *, close: bool = False) -> None:
         """Give back what the view holds, and say in it that nothing will come any more. Idempotent.
@@ -153,9 +146,10 @@ class LiveView(ABC):
             first, self._why = not self._why, self._why or why
         if first:
             ticker_of(self.session).forget(self)
+            self._save_copy()
             self.resources.close()
             if self._widget is not None:
-                self._widget.ended = why
+                self._widget.ended = self._end_text()
         if close or self._widget is None:
             registry_of(self.session).forget(self)
             if self._widget is not None:
@@ -183,7 +177,18 @@ class LiveView(ABC):
         data, metadata = self._repr_mimebundle_(**kwargs)
         display(data, metadata=metadata, raw=True)  # type: ignore[no-untyped-call]
         if len(data) > 1:
-            display(saved_output(self.label, data["text/plain"]), raw=True)  # type: ignore[no-untyped-call]
+            self._copy.show(data["text/plain"], self.picture())
+
+    def _save_copy(self) -> None:
+        if self._widget is not None:
+            words = "\n\n".join(filter(None, [self._widget.notice, self._widget.words]))
+            self._copy.replace(words, self.picture())
+
+    def _end_text(self) -> str:
+        """Return why the view has ended, and of when its last picture is."""
+        if self._why and self._seen_at:
+            return f"{self._why} This is how it was at {self._seen_at}."
+        return self._why
 
     def _refresh_widget(self) -> None:
         with self._looking:
@@ -202,7 +207,12 @@ class LiveView(ABC):
                 failed = f"This view has stopped ({type(error).__name__}: {error})."
                 self.end(CLOSED if self.session.closed else failed)
                 return
+            still = self.standstill
+            if not still:
+                self._seen_at = time.strftime("%H:%M:%S")
             if text == self._last:
+                if widget.notice != still:
+                    widget.notice = still
                 return
             self._last = text
             if len(text) > MAX_FRAME_BYTES:
@@ -212,7 +222,7 @@ class LiveView(ABC):
                 )
                 return
             with widget.hold_sync():
-                widget.frame, widget.words, widget.notice = frame, words, ""
+                widget.frame, widget.words, widget.notice = frame, words, still
                 widget.number += 1
 
     def _on_close(self, _change: Any) -> None:
@@ -236,18 +246,3 @@ def _has_front_end() -> bool:
     from IPython.core.getipython import get_ipython
 
     return hasattr(get_ipython(), "kernel")
-
-
-@cache
-def _widget_class(parts: tuple[str, ...]) -> type[LiveWidget]:
-    """Return the widget class of a view: its script and style are of the class, as anywidget's are.
-
-    Script and style are one text each: a browser cannot import the shared parts from beside it.
-    """
-    names = ("live", *parts)
-    texts = {
-        f"_{key}": "\n".join((_STATIC / f"{name}.{kind}").read_text("utf-8") for name in names)
-        for key, kind in (("esm", "js"), ("css", "css"))
-    }
-    name = f"{parts[-1].title()}Widget"
-    return type(name, (LiveWidget,), {**texts, "_anywidget_id": f"{__name__}.{name}"})
