@@ -445,6 +445,21 @@ def test_what_a_later_cell_ends_is_still_to_be_seen_and_stays_in_the_file(open_c
     assert page.errors == []
 
 
+def test_a_view_that_is_shown_later_changes_no_other(open_cells: Open) -> None:
+    page = open_cells("session.qos_lab()", "", "", "")
+    table = region(page, "QoS lab").locator(".roslab-profiles")
+    looks = """table => [table, ...table.querySelectorAll('td')].map(
+        e => [e.offsetWidth, getComputedStyle(e).borderBottomStyle, getComputedStyle(e).color])"""
+    before = table.evaluate(looks)
+    for number, name in enumerate(("log", "parameters", "service"), start=2):
+        source, label = VIEWS[name]
+        page.write_cell(number, source)
+        page.run_cell(number)
+        expect(region(page, label)).to_be_visible()
+    assert table.evaluate(looks) == before
+    assert page.errors == []
+
+
 @pytest.mark.parametrize("width", [1024, 512])  # 512: a window of 1024 px at 200 %
 def test_graph_and_timeline_are_in_sight_whole_on_a_narrow_page(
     open_cells: Open, width: int
