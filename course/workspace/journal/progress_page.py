@@ -153,8 +153,7 @@ def _format_hand_in(progress: WorkDone) -> str:
     named = " and ".join([", ".join(folders[:-1]), folders[-1]] if folders[1:] else folders)
     return (
         f"save your notebooks, and give your instructor all files of {named}, each folder as it is "
-        "(a quiz's answers are in its .attempts.jsonl file), in the way that they have named. You "
-        "may hand in again until the due date; what was handed in last counts."
+        "(a quiz's answers are in its .attempts.jsonl file), in the way that they have named."
     )
 
 
