@@ -481,7 +481,7 @@ def test_graph_and_timeline_are_in_sight_whole_on_a_narrow_page(
     expect(graph.locator(".rosgraph-qos").first).to_have_text(
         re.compile("reliable · volatile · 10")
     )
-    reasons = " ".join(graph.locator(".rosgraph-reason").all_inner_texts())
+    reasons = " ".join(graph.locator(".rosgraph-reason").all_text_contents())
     assert reasons == "reliability: offers best effort, requests reliable"
     assert page.errors == []
 
