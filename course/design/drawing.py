@@ -9,8 +9,8 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 from course.design.endpoints import DesignEndpoint
 from course.design.findings import Declared, Link, find_links
+from course.graph.shapes import MERMAID
 
-_SHAPES = {"msg": ('(["', '"])'), "srv": ('{{"', '"}}'), "action": ('[["', '"]]')}
 _WORDS = {"msg": "topic", "srv": "service", "action": "action"}
 
 
@@ -30,27 +30,36 @@ class Drawn(Protocol):
 
 
 def draw_mermaid(design: Drawn) -> str:
-    """Return the graph: nodes are boxes, topics round, services hexagons, actions framed."""
+    """Return the graph: its shapes are those of `shapes.MERMAID`, its labels the QoS."""
+    begin, end = MERMAID["node"]
     nodes = {label: f"n{number}" for number, label in enumerate(design.nodes)}
     lines = ["flowchart LR"]
-    lines += [f'  {key}["<b>{label}</b>"]' for label, key in nodes.items()]
+    lines += [f'  {key}{begin}"<b>{label}</b>"{end}' for label, key in nodes.items()]
     for number, link in enumerate(find_links(design.nodes.values())):
         lines += _draw_link(link, f"l{number}", nodes, link.name in design.outside)
     return "\n".join(lines)
 
 
 def _draw_link(link: Link, key: str, nodes: dict[str, str], outside: bool) -> Iterator[str]:
-    begin, end = _SHAPES[link.kind]
+    begin, end = MERMAID[_WORDS[link.kind]]
     types = ", ".join(dict.fromkeys(e.type_name.split("/")[-1] for _, e in link.all_ends))
-    yield f"  {key}{begin}{link.name}<br/><small>{types}</small>{end}"
+    yield f'  {key}{begin}"{link.name}<br/><small>{types}</small>"{end}'
     arrow = "-->" if link.kind == "msg" else "-.->"
-    yield from (f"  {nodes[label]} {arrow} {key}" for label, _ in link.writers)
-    yield from (f"  {key} {arrow} {nodes[label]}" for label, _ in link.readers)
+    yield from (f"  {nodes[label]} {_arrow(end)} {key}" for label, end in link.writers)
+    yield from (f"  {key} {_arrow(end)} {nodes[label]}" for label, end in link.readers)
     if outside:
         if not link.writers:
             yield f"  o{key}((outside)) {arrow} {key}"
         if not link.readers:
             yield f"  {key} {arrow} o{key}((outside))"
+
+
+def _arrow(end: DesignEndpoint) -> str:
+    """Return an arrow with the QoS of its endpoint: "reliable · volatile · 10"."""
+    if end.role.type_kind != "msg":
+        return "-.->"
+    qos = qos_in_words(end.qos).replace(", ", " · ").replace("keep last ", "")
+    return f'-- "{qos}" -->'
 
 
 def describe_design(design: Drawn) -> str:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Mapping
 
 from course.graph.model import Endpoint, Exchange, Graph, Mismatch, Topic
 from course.messages.yaml_text import format_count
+
+_VALUE = re.compile(r"\b[A-Z][A-Z_]+\b")
 
 
 def describe_graph(graph: Graph) -> str:
@@ -35,6 +38,21 @@ def describe_qos(endpoint: Endpoint) -> str:
     return ", ".join(parts)
 
 
+def shorten_qos(endpoints: Iterable[Endpoint]) -> str:
+    """Return the QoS of one node's endpoints on a topic as it stands in a drawing.
+
+    Example:
+        "reliable · volatile · 10"; the last is the depth of the queue, where it is known.
+    """
+    texts = dict.fromkeys(_shorten_endpoint(endpoint.qos) for endpoint in endpoints)
+    return " or ".join(filter(None, texts))
+
+
+def plain_words(text: str) -> str:
+    """Return a text with the names of QoS values as everyday words: "best effort"."""
+    return _VALUE.sub(lambda match: match[0].replace("_", " ").lower(), text)
+
+
 def describe_mismatch(topic: str, pair: Mismatch) -> str:
     """Return one sentence about a pair that DDS does not connect."""
     source = "DDS reports it" if pair.from_event else "DDS does not connect them"
@@ -48,6 +66,12 @@ def describe_mismatch(topic: str, pair: Mismatch) -> str:
 def join_policies(pairs: Iterable[Mismatch]) -> str:
     """Return the policies that break pairs, each once."""
     return ", ".join(dict.fromkeys(name.lower() for pair in pairs for name in pair.policies))
+
+
+def _shorten_endpoint(qos: Mapping[str, str]) -> str:
+    parts = [plain_words(qos[name]) for name in ("reliability", "durability") if name in qos]
+    queue = "all" if qos.get("history") == "KEEP_ALL" else qos.get("depth", "")
+    return " · ".join([*parts, *([queue] if queue else [])])
 
 
 def _topic_lines(topic: Topic) -> Iterable[str]:

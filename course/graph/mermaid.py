@@ -5,24 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from course.graph import graph_text
-from course.graph.model import Exchange, Graph, Mismatch, Topic
+from course.graph.model import Endpoint, Exchange, Graph, Mismatch, Topic
+from course.graph.shapes import MERMAID
 
 
 def draw_mermaid(graph: Graph) -> str:
-    """Return a Mermaid flowchart: nodes as rounded boxes, topics as plain ones, mismatches in red.
+    """Return a Mermaid flowchart: its shapes are those of `shapes.MERMAID`, mismatches are red.
 
-    Arrows run from publisher over topic to subscription, and from client to server.
+    Arrows run from publisher over topic to subscription, with their QoS, and from client to server.
     """
     lines = ["flowchart LR"]
     names = sorted(set(graph.nodes) | _mentioned_nodes(graph))
     ids = {name: f"n{index}" for index, name in enumerate(names)}
-    lines += [f"  {ids[name]}([{_quote_text(name)}])" for name in names]
+    lines += [f"  {ids[name]}{_enclose('node', _quote_text(name))}" for name in names]
     links = 0
     broken: list[int] = []
     for index, topic in enumerate(graph.topics):
-        lines.append(
-            f"  t{index}[{_quote_text(f'{topic.name}<br/>{_shorten_types(topic.types)}')}]"
-        )
+        text = _quote_text(f"{topic.name}<br/>{_shorten_types(topic.types)}")
+        lines.append(f"  t{index}{_enclose('topic', text)}")
         for line, red in _topic_arrows(topic, f"t{index}", ids):
             lines.append(f"  {line}")
             broken += [links] if red else []
@@ -38,29 +38,39 @@ def draw_mermaid(graph: Graph) -> str:
 def _topic_arrows(topic: Topic, ident: str, ids: dict[str, str]) -> Iterator[tuple[str, bool]]:
     """Yield (arrow, whether it is red) for each endpoint, and each pair that does not connect."""
     sent, heard = topic.broken_pairs
-    for node in dict.fromkeys(end.node for end in topic.publishers):
+    for node, ends in _by_node(topic.publishers):
         pairs = sent.get(node, [])
         untold = [pair for pair in pairs if pair not in heard.get(pair.subscription, [])]
-        yield _format_arrow(ids[node], ident, untold), bool(pairs)
-    for node in dict.fromkeys(end.node for end in topic.subscriptions):
-        yield _format_arrow(ident, ids[node], heard.get(node, [])), node in heard
+        yield _format_arrow(ids[node], ident, ends, untold), bool(pairs)
+    for node, ends in _by_node(topic.subscriptions):
+        yield _format_arrow(ident, ids[node], ends, heard.get(node, [])), node in heard
 
 
-def _format_arrow(source: str, target: str, pairs: list[Mismatch]) -> str:
+def _by_node(ends: tuple[Endpoint, ...]) -> Iterator[tuple[str, list[Endpoint]]]:
+    for node in dict.fromkeys(end.node for end in ends):
+        yield node, [end for end in ends if end.node == node]
+
+
+def _format_arrow(source: str, target: str, ends: list[Endpoint], pairs: list[Mismatch]) -> str:
+    qos = graph_text.shorten_qos(ends)
     if not pairs:
-        return f"{source} --> {target}"
-    return (
-        f"{source} -. {_quote_text(f'{graph_text.join_policies(pairs)} does not fit')} .-x {target}"
-    )
+        return f"{source} -- {_quote_text(qos)} --> {target}" if qos else f"{source} --> {target}"
+    lines = [*([qos] if qos else []), f"{graph_text.join_policies(pairs)} does not fit"]
+    return f"{source} -. {_quote_text('<br/>'.join(lines))} .-x {target}"
 
 
 def _exchange_lines(
     kind: str, ident: str, exchange: Exchange, ids: dict[str, str]
 ) -> Iterator[str]:
     label = _quote_text(f"{kind} {exchange.name}<br/>{_shorten_types((exchange.type,))}")
-    yield f"  {ident}{{{{{label}}}}}"
+    yield f"  {ident}{_enclose(kind, label)}"
     yield from (f"  {ids[node]} ==> {ident}" for node in exchange.clients)
     yield from (f"  {ident} ==> {ids[node]}" for node in exchange.servers)
+
+
+def _enclose(kind: str, text: str) -> str:
+    begin, end = MERMAID[kind]
+    return f"{begin}{text}{end}"
 
 
 def _mentioned_nodes(graph: Graph) -> set[str]:

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from types import ModuleType
 
 from course.interfaces import bundled, packages, standins
-from course.interfaces.building import cache
+from course.interfaces.building import cache, toolchain
 from course.interfaces.building.unit import Unit
 from course.interfaces.errors import BuildError, NotDefinedYetError
 
@@ -61,6 +61,8 @@ class BundledLoader(packages.MadeHere):
         unit = bundled.bundled_unit(package)
         if package in standins.reasons or unit.type_names[0] in packages.loaded:
             return
+        if cache.find_built(unit) is None and toolchain.compiler_problem() is None:
+            _announce_build(package)
         try:
             obtain_unit(unit)
         except BuildError as error:
@@ -106,6 +108,17 @@ def obtain_unit(unit: Unit) -> None:
                 f"{unit.label} was built and cannot be loaded: {error}. "
                 "Reinstalling the ROS packages of this environment may help."
             ) from error
+
+
+def _announce_build(package: str) -> None:
+    """Say in a notebook why the import that has just begun takes so long."""
+    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    if hasattr(shell, "kernel"):
+        print(  # noqa: T201 - the cell shows nothing else meanwhile
+            f"{package} is being compiled on this machine, as no ROS 2 is installed here. That "
+            "takes 5 to 30 seconds, once: it is kept for the next time.",
+            flush=True,
+        )
 
 
 def install() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from course.graph.reader import find_incompatibilities
@@ -186,6 +187,18 @@ def expected_count(experiment: Experiment) -> int | None:
         return None if experiment.drop_percent else min(COUNT, _queue_capacity(requested))
     # Lost messages are repaired only as long as the writer still has them.
     return COUNT if not experiment.drop_percent or _queue_capacity(offered) >= COUNT else None
+
+
+def chance_margin(experiment: Experiment) -> int:
+    """Return by how many messages chance alone may well move an outcome, either way.
+
+    Twice the standard deviation of a loss that drops each message by itself: 19 of 20 outcomes are
+    that near to the most likely one. 0 where the rules leave nothing to the loss.
+    """
+    share = experiment.drop_percent / 100
+    if not share or expected_count(experiment) is not None:
+        return 0
+    return math.ceil(2 * math.sqrt(COUNT * share * (1 - share)))
 
 
 def _has_replay(experiment: Experiment) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from typing import Any, Self, TypeVar
 
 from rclpy.node import Node
@@ -97,6 +97,7 @@ class CoreSession:
         self.context.on_shutdown(self._endings.beat)
         self._report = CloseReport()
         self._closed = False
+        self._before_close: list[Callable[[], None]] = []
         self._on_close: list[Callable[[], None]] = []
         self._sim: SimulatedTime | None = None
         if sim_time:
@@ -491,6 +492,7 @@ class CoreSession:
             What was left behind: `leaked` names the threads whose callback did not end. Called
             from a callback of this session, it returns at once, and the report is filled in later.
         """
+        self._announce_close()
         job = current_job()
         if job is not None and job.home.session_key is self._host.pool:
             # A thread cannot wait for its own end: another one does it, once this callback is over.
@@ -504,6 +506,11 @@ class CoreSession:
                 close_order.close_session(self, self._report, timeout)
                 self._closed = True
             return self._report
+
+    def before_close(self, callback: Callable[[], None]) -> None:
+        """Call `callback` when the session is about to close, while all its nodes still run."""
+        argument_checks.check_function(callback, "The callback", "lambda: print('closing')")
+        self._before_close.append(callback)
 
     def on_close(self, callback: Callable[[], None]) -> None:
         """Call `callback` when the session closes, after its threads have stopped."""
@@ -524,6 +531,11 @@ class CoreSession:
         return f"<Session on domain {self.domain_id}: {state}>"
 
     # Inside.
+
+    def _announce_close(self) -> None:
+        while self._before_close and not self.closed:
+            with suppress(Exception):  # whatever it wanted to see: the session closes
+                self._before_close.pop()()
 
     def _release_domain(self) -> None:
         if self._lease is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import asdict
 from typing import Any
 
@@ -10,6 +11,7 @@ from course.graph.mermaid import draw_mermaid
 from course.graph.model import Graph
 from course.messages.yaml_text import format_count
 from course.runtime.core_session import CoreSession
+from course.views.pictures.graph_svg import draw_graph_svg
 from course.views.shared.live_view import Frame, LiveView
 
 MAX_BOXES = 150
@@ -31,6 +33,8 @@ class GraphView(LiveView):
         """Show the graph of ``session``, with all that the ROS tools hide if ``everything``."""
         super().__init__(session, everything)
         self._everything = everything
+        self._shown = Graph()
+        self._still_since = ""
 
     @property
     def graph(self) -> Graph:
@@ -53,9 +57,24 @@ class GraphView(LiveView):
         return graph_text.describe_graph(self.graph)
 
     def look(self) -> tuple[Frame, str]:
-        """Return both from one look at the graph."""
+        """Return both from one look at the graph; when the last node goes, the graph stays."""
         graph = self.graph
-        return self._drawing_frame(graph), graph_text.describe_graph(graph)
+        if graph.nodes or not self._shown.nodes:
+            self._shown, self._still_since = graph, ""
+        elif not self._still_since:
+            self._still_since = time.strftime("%H:%M:%S")
+        return self._drawing_frame(self._shown), graph_text.describe_graph(self._shown)
+
+    def picture(self) -> str:
+        """Return the drawing that was shown last."""
+        return draw_graph_svg(self._drawing_frame(self._shown)) if self._shown.nodes else ""
+
+    @property
+    def standstill(self) -> str:
+        """That no node runs any more, once one did."""
+        if not self._still_since:
+            return ""
+        return f"No node runs any more since {self._still_since}: this is the last graph before."
 
     def _drawing_frame(self, graph: Graph) -> Frame:
         apart = graph.mismatches
@@ -68,10 +87,10 @@ class GraphView(LiveView):
         # Counted first: the layout of a graph that nobody could follow takes long, too.
         count = layout.count_boxes(graph)
         if count > MAX_BOXES:
-            drawing, note = layout.Drawing((), (), 0, 0), self._too_large(graph, count)
-        else:
-            drawing, note = layout.draw_graph(graph), ""
-        return {"title": title, "note": note, **asdict(drawing)}
+            none, note = layout.Drawing((), (), 0, 0), self._too_large(graph, count)
+            return {"title": title, "note": note, **asdict(none)}
+        wide, tall = (asdict(layout.draw_graph(graph, way)) for way in layout.WAYS)
+        return {"title": title, "note": "", **wide, "tall": tall}
 
     def _too_large(self, graph: Graph, count: int) -> str:
         exchanges = len(graph.services) + len(graph.actions)

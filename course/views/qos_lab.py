@@ -35,8 +35,22 @@ class LabTrial:
         """Whether the prediction came true; None while it is not known."""
         if self.outcome is None:
             return None
-        arrived = len(self.outcome.received)
-        return self.outcome.connected == self.connects and self.arrive in (None, arrived)
+        if self.outcome.connected != self.connects:
+            return False
+        return self.missed_by is None or self.missed_by <= self.margin
+
+    @property
+    def margin(self) -> int:
+        """By how many messages a right prediction may miss: a random loss is not exact."""
+        lossy = self.outcome is not None and self.outcome.lossy and self.outcome.connected
+        return rules.chance_margin(self.experiment) if lossy else 0
+
+    @property
+    def missed_by(self) -> int | None:
+        """How far the predicted number of messages is from what arrived; None if there is none."""
+        if self.arrive is None or self.outcome is None:
+            return None
+        return abs(self.arrive - len(self.outcome.received))
 
 
 class QoSLab(LiveView):
@@ -86,7 +100,8 @@ class QoSLab(LiveView):
         Args:
             scenario: "stream", "late joiner", "slow reader", "deadline" or "liveliness".
             connects: whether you expect DDS to connect the two.
-            arrive: how many of 30 messages you expect to arrive; None leaves that open.
+            arrive: how many of 30 messages you expect to arrive; None leaves that open. Where the
+                loss is random, a number as near as chance allows is right.
             loss: share of packets that the link drops, in %.
             offered: the writer's profile from now on.
             requested: the reader's profile from now on.
@@ -177,6 +192,8 @@ def _trial_data(trial: LabTrial) -> dict[str, Any]:
     said = "connected" if trial.connects else "not connected"
     said += f", {trial.arrive} messages" if trial.arrive is not None else ""
     truth = "That was right." if trial.is_right else "It came out otherwise."
+    if trial.is_right and trial.missed_by:
+        truth += f" (The loss is random: up to {trial.margin} more or less are chance.)"
     return {
         "title": f"{experiment.scenario}{loss}",
         "pair": f"{experiment.offered} -> {experiment.requested}",

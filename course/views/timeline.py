@@ -10,10 +10,11 @@ from typing import Any
 from course.errors import SessionError
 from course.messages import mcap_file
 from course.messages.mcap_file import RecordingError
-from course.messages.yaml_text import format_count
 from course.runtime.core_session import CoreSession
 from course.util import argument_checks
+from course.views.pictures.timeline_svg import draw_timeline_svg
 from course.views.shared.live_view import Frame, LiveView
+from course.views.timeline_words import describe_figures, describe_shortening
 from course.watch import timeline
 from course.watch.callbacks import CallbackTap, Run
 from course.watch.timeline import Figures, Trace
@@ -56,6 +57,8 @@ class Timeline(LiveView):
         super().__init__(session, *topics, window)
         self._window = round(window * 1e9)
         self._rows: list[tuple[Trace, CallbackTap]] = []
+        self._still_ns = 0  # when the last publisher went; 0 while there is one
+        self._frame: Frame = {}
         try:
             for name, msg_type in topics:
                 self._add_topic(name, msg_type)
@@ -104,7 +107,37 @@ class Timeline(LiveView):
     def make_frame(self) -> Frame:
         """Return lanes as counts a column, and figures in words."""
         self._keep_up()
+        return self._frame_at(time.time_ns())
+
+    def words(self) -> str:
+        """Return the figures of each topic."""
+        self._keep_up()
+        return self._words_at(time.time_ns())
+
+    def look(self) -> tuple[Frame, str]:
+        """Return both; when the last publisher goes, the window stands still."""
+        self._keep_up()
         now = time.time_ns()
+        if any(trace.is_published for trace, _ in self._rows):
+            self._still_ns = 0
+        elif not self._still_ns:
+            self._still_ns = now
+        self._frame = self._frame_at(self._still_ns or now)
+        return self._frame, self._words_at(self._still_ns or now)
+
+    def picture(self) -> str:
+        """Return the lanes that were shown last."""
+        return draw_timeline_svg(self._frame) if self._frame else ""
+
+    @property
+    def standstill(self) -> str:
+        """That nobody publishes any more, once somebody did."""
+        if not self._still_ns or not any(trace.latest_messages for trace, _ in self._rows):
+            return ""
+        moment = time.strftime("%H:%M:%S", time.localtime(self._still_ns / 1e9))
+        return f"Nobody publishes here any more since {moment}: these are the seconds before."
+
+    def _frame_at(self, now: int) -> Frame:
         # Columns stay where they are while time passes: the window moves on by whole ones.
         step = self._window // timeline.COLUMNS
         start = (now // step + 1) * step - self._window
@@ -115,15 +148,14 @@ class Timeline(LiveView):
             "topics": [self._topic_data(trace, tap, start) for trace, tap in self._rows],
         }
 
-    def words(self) -> str:
-        """Return the figures of each topic."""
+    def _words_at(self, now: int) -> str:
         lines = [f"The last {self._window / 1e9:g} s"]
-        start = time.time_ns() - self._window
-        found = self.figures()
+        start = now - self._window
         for trace, tap in self._rows:
-            text = describe_figures(found[trace.topic]) + _describe_shortening(trace, tap, start)
+            figures = timeline.compute_figures(trace.passages_since(start))
+            text = describe_figures(figures) + describe_shortening(trace, tap, start)
             lines.append(f"  {trace.topic}: {text}")
-            for node, runs in self._runs_by_node(trace.topic).items():
+            for node, runs in _by_node(tap.runs_since(start)).items():
                 missed = sum(count for _, count in timeline.find_drops(runs))
                 passed = f", {missed} messages passed it by" if missed else ""
                 lines.append(f"    callbacks of {node}: {len(runs)}{passed}")
@@ -145,9 +177,6 @@ class Timeline(LiveView):
             trace.adapt_qos()
             tap.watch(nodes)
 
-    def _runs_by_node(self, topic: str) -> dict[str, list[Run]]:
-        return _by_node(self.callback_runs(topic))
-
     def _topic_data(self, trace: Trace, tap: CallbackTap, start: int) -> dict[str, Any]:
         passages = trace.passages_since(start)
         found = timeline.compute_figures(passages)
@@ -165,7 +194,7 @@ class Timeline(LiveView):
             )
         return {
             "name": trace.topic,
-            "text": describe_figures(found) + _describe_shortening(trace, tap, start),
+            "text": describe_figures(found) + describe_shortening(trace, tap, start),
             "lanes": lanes,
             "rate": _round_values(plots.rate, 1.0, 2),
             "p50": _round_values(plots.p50, 1e3, 3),
@@ -192,43 +221,12 @@ class Timeline(LiveView):
         return round((moment - start / 1e9) / (self._window / 1e9), 4)
 
 
-def describe_figures(figures: Figures) -> str:
-    """Return figures in words."""
-    if not figures.count:
-        return "nothing"
-    parts = [f"{figures.count} messages"]
-    if figures.rate is not None:
-        parts.append(f"{figures.rate:.1f} Hz")
-    if figures.latency_p50 is not None and figures.latency_p95 is not None:
-        median, late = figures.latency_p50 * 1e3, figures.latency_p95 * 1e3
-        parts.append(f"latency p50 {median:.2f} ms, p95 {late:.2f} ms")
-    longest = max((end - begin for begin, end in figures.gaps), default=0.0)
-    if figures.gaps:
-        count = len(figures.gaps)
-        parts.append(f"{format_count(count, 'gap')}, the longest {longest:.2f} s")
-    if figures.lost:
-        parts.append(f"{figures.lost} lost on the way")
-    return ", ".join(parts)
-
-
 def _by_node(runs: list[Run]) -> dict[str, list[Run]]:
     """Return the runs of each node's callbacks, in the order in which messages were published."""
     found: dict[str, list[Run]] = {}
     for run in sorted(runs, key=lambda run: (run.node, run.published)):
         found.setdefault(run.node, []).append(run)
     return found
-
-
-def _describe_shortening(trace: Trace, tap: CallbackTap, start: int) -> str:
-    """Return, to be added to the figures, that what came since ``start`` (ns) is not all here."""
-    begins = max(trace.complete_since, tap.complete_since)
-    if begins <= start:
-        return ""
-    seconds = (time.time_ns() - begins) / 1e9
-    return (
-        f" (of the last {seconds:.1f} s only: a timeline keeps {timeline.KEPT_MESSAGES} messages "
-        "of a topic, and as many runs of callbacks)"
-    )
 
 
 def _round_values(values: list[float | None], unit: float, digits: int) -> list[float | None]:

@@ -79,7 +79,10 @@ class Plots(NamedTuple):
 
 
 class Trace:
-    """The passages of one topic, as a hidden subscription of the session's sees them."""
+    """The passages of one topic, as a hidden subscription of the session's sees them.
+
+    ``is_published`` says whether somebody published it when `adapt_qos` looked last.
+    """
 
     def __init__(self, session: CoreSession, topic: str, msg_type: Any | None = None) -> None:
         """Trace ``topic`` from now on.
@@ -95,6 +98,7 @@ class Trace:
             lambda: type_on(session.observer, self.topic), what=f"somebody to use {self.topic}"
         )
         self._messages: deque[tuple[int, bytes]] = deque()
+        self.is_published = True
         self._size = 0
         self._subscribe()
 
@@ -110,6 +114,7 @@ class Trace:
         For example, a talker's cell is run again with another QoS. A request for less still fits.
         """
         offers = self._session.observer.get_publishers_info_by_topic(self.topic)
+        self.is_published = bool(offers)
         if any(reader.find_incompatibilities(offer.qos_profile, self._qos) for offer in offers):
             self._session.unwatch(self._subscription)
             self._subscribe()

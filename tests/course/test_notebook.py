@@ -6,7 +6,7 @@ import pytest
 from rclpy.node import Node
 
 import course
-from course.notebook import News
+from course.cell_news.news import News
 from tests.kernel import Kernel
 
 SETUP = """
@@ -40,6 +40,86 @@ def notebook():
     opened = Notebook()
     yield opened
     opened.close()
+
+
+def test_who_has_initialised_rclpy_is_said(notebook):
+    notebook.text("%load_ext course\nimport rclpy, course\nrclpy.init()")
+    status, shown = notebook.text("rclpy.init()")
+    assert status == "error"
+    assert "An earlier cell has called rclpy.init() itself" in shown
+    assert "course's session has initialised" not in shown
+    notebook.text("course.session()")  # beside it: the default context is still the learner's
+    assert "An earlier cell has called rclpy.init() itself" in notebook.text("rclpy.init()")[1]
+
+
+NO_INIT = """
+class Bad(Node):
+    def __init__(self):
+        self.create_timer(1.0, print)
+class Idle(Node):
+    def __init__(self):
+        self.count = 0
+"""
+
+
+def test_a_node_without_super_init_is_one_sentence(notebook):
+    notebook.text(SETUP + NO_INIT)
+    for name in ("Bad", "Idle"):
+        status, shown = notebook.text(f"course.run({name})")
+        assert (status, shown.count("\n")) == ("error", 0), shown
+        assert f"{name}.__init__ has not called super().__init__, so this is no node" in shown
+    status, shown = notebook.text("Bad()")
+    assert status == "error"
+    assert "Bad.__init__ has not called super().__init__" in shown
+
+
+def test_after_a_restart_a_name_that_is_not_known_yet_says_what_to_run(notebook):
+    notebook.text("%load_ext course")
+    status, shown = notebook.text("session.graph()")
+    assert status == "error"
+    assert "This kernel does not know 'session' yet" in shown
+    assert "Run All Above Selected Cell" in shown
+    assert "does not know" not in notebook.text("a_typo")[1]
+
+
+PAIR = """
+from std_msgs.msg import String
+from rclpy.qos import qos_profile_sensor_data
+class Pair(Node):
+    def __init__(self):
+        super().__init__("pair")
+        self.create_publisher(String, "scan", qos_profile_sensor_data)
+        self.create_subscription(String, "scan", print, 10)
+"""
+
+
+def test_qos_that_does_not_fit_is_news_once(notebook):
+    notebook.text(SETUP + PAIR)
+    _, shown = notebook.text(
+        "p = course.run(Pair); course.until(lambda: p.count_publishers('scan'))"
+    )
+    if "do not connect" not in shown:  # the graph may have been a moment late
+        _, shown = notebook.text("None")
+    assert "/pair and /pair do not connect on /scan: reliability (offers BEST_EFFORT," in shown
+    assert "session.graph() shows it in red." in shown
+    assert notebook.text("None") == ("ok", "")
+
+
+@pytest.mark.parametrize(
+    ("spin", "name"),
+    [("rclpy.spin(node)", "rclpy.spin()"), ("executor.spin()", "executor.spin()")],
+)
+def test_a_cell_that_blocks_in_spin_says_so_while_it_does(notebook, spin, name):
+    notebook.text(SETUP)
+    notebook.text(SILENT)
+    request = notebook.client.execute(f"executor.add_node(node)\n{spin}", stop_on_error=False)
+    while (message := notebook.client.get_iopub_msg(timeout=60))["msg_type"] != "display_data":
+        pass
+    assert message["parent_header"]["msg_id"] == request, "under the cell that blocks"
+    assert f"{name} blocks this cell until you interrupt it" in str(message["content"]["data"])
+    notebook.manager.interrupt_kernel()
+    while notebook.client.get_shell_msg(timeout=60)["parent_header"]["msg_id"] != request:
+        pass
 
 
 MANAGED = """
@@ -92,7 +172,7 @@ def test_what_the_learner_sees(notebook):
     status, shown = notebook.text("t = course.run(Talker); course.until(lambda: t.count > 5); None")
     assert status == "ok"
     assert "Talker.say of /talker raised ValueError: <three>. The node goes on spinning." in shown
-    assert "said in a thread" not in shown
+    assert "A callback of /talker has printed: as callbacks run while no cell does, that" in shown
     assert notebook.text("None") == ("ok", "")  # said once
 
     status, shown = notebook.text("rclpy.spin_once(t)")
@@ -111,7 +191,8 @@ def test_what_the_learner_sees(notebook):
 
 def test_a_restart_and_an_interrupt_leave_nothing_behind(notebook):
     notebook.text(SETUP)
-    domain_id = int(notebook.text("t = course.run(Talker); print(course.session().domain_id)")[1])
+    domain_id = int(notebook.text("print(course.session().domain_id)")[1])
+    notebook.text("t = course.run(Talker)")
     with course.Session(domain_id=domain_id) as outside:
         watcher = outside.run(Node, "watcher")
         outside.until(

@@ -186,7 +186,7 @@ design
 # %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-how-to-check", "locked": true, "schema_version": 3, "solution": false}
 # ## Check it yourself
 #
-# Above, boxes are nodes, round shapes topics, hexagons services, and framed boxes actions.
+# Above, round shapes are nodes, boxes topics, hexagons services, and framed boxes actions.
 #
 # The next cell starts an examiner in a process of its own, which brings the design up and reads the
 # ROS graph. For each check it says what was observed, what was needed, and why it matters on a

@@ -398,10 +398,13 @@ class RobotInterface(Robot):
 # a cell of your own helps more, `hint=3` most. There are 20 points: 10 for these checks, 5 at grading
 # (2 of them for your choices), 5 for your two answers.
 #
-# **Look inside**, after `import course`: `course.run(RobotInterface, threads=4)`, and then use it as
-# an operator would. `course.session().service(name)` and `course.session().action(name)` are forms
-# for a service and an action, `course.session().timeline(name)` shows a topic's messages,
-# `course.session().parameters("robot_interface")` a node's parameters: whichever you chose.
+# **Look inside**, in cells of your own after `import course`: `course.run(RobotInterface, threads=4)`
+# (so it answers others, too, while a goal is under way), and then use it as an operator would.
+# `course.session().service(name)` and `course.session().action(name)` are forms for a service and an
+# action, `course.session().timeline(name)` shows a topic's messages,
+# `course.session().parameters("robot_interface")` a node's parameters: whichever you chose. No motor
+# turns here, so a drive ends when you cancel it, or move the robot yourself:
+# `%ros topic pub --once /hardware/position std_msgs/msg/Float64 "data: 3.0"` puts it at 3 m.
 
 # %% nbgrader={"grade": true, "grade_id": "patterns-visible", "locked": true, "points": 0, "schema_version": 3, "solution": false}
 from autograder import check

@@ -119,7 +119,7 @@ def describe_job(job: CallbackRun) -> BlockedCallback:
 
 _ADVICE_SLOW = (
     "A callback should return soon: let a timer do what a loop with sleep() does, or run the node "
-    "with more threads."
+    "with more threads, as in course.run(…, threads=4)."
 )
 _ADVICE_ONE_THREAD = (
     "Use call_async() or send_goal_async() and let a done callback go on, or make the callback "

@@ -22,6 +22,11 @@ from course.runtime.executor.blocked import describe_job
 from course.runtime.executor.executor_pool import ExecutorPool
 from course.runtime.nodes import name_conflicts
 from course.runtime.nodes.half_made import HalfMade, Remains
+from course.runtime.nodes.uninitialised import (
+    describe_missing_init,
+    explain_uninitialised,
+    is_uninitialised,
+)
 from course.runtime.output.rcutils_tap import hearing_constructors
 from course.runtime.ros_names import is_name, node_name
 from course.runtime.teardown import destroy_node, is_alive, is_being_destroyed
@@ -279,6 +284,8 @@ class NodeRegistry:
             with suppress(Exception):
                 for name in self.half_made.note_failure(error, factory, key, self._is_news(before)):
                     self._made_by[name] = factory
+            if missing := explain_uninitialised(error):
+                raise SessionError(missing) from None
             raise
         if not isinstance(node, Node):
             name = getattr(factory, "__qualname__", repr(factory))
@@ -286,6 +293,8 @@ class NodeRegistry:
                 "run() needs a Node class, or a function that returns a node; "
                 f"{name} returned {type(node).__name__}."
             )
+        if is_uninitialised(node):
+            raise SessionError(describe_missing_init(type(node)))
         return node
 
     def _is_news(self, before: Container[threading.Thread]) -> Callable[[threading.Thread], bool]:

@@ -15,7 +15,7 @@ from course.runtime.core_session import CoreSession
 from course.views.shared import truncate
 from course.views.shared.live_widget import LiveWidget, widget_class
 from course.views.shared.refresher import ticker_of
-from course.views.shared.static_fallback import saved_output
+from course.views.shared.saved_copy import SavedCopy
 from course.views.shared.view_registry import registry_of
 
 MIN_PERIOD_S = 0.1
@@ -77,11 +77,12 @@ class LiveView(ABC):
         self.resources = contextlib.ExitStack()
         self._widget: LiveWidget | None = None
         self._due = self._slow_due = 0.0
-        self._last = self._words = ""
+        self._last = ""
         self._drawn = 0
         self._stumbles = 0
         self._why = ""
-        self._saved: Any = None
+        self._seen_at = ""
+        self._copy = SavedCopy(self.label)
         self._looking = threading.RLock()
         registry_of(session).put(self, (type(self).__qualname__, repr(about)))
 
@@ -98,7 +99,12 @@ class LiveView(ABC):
         return self.make_frame(), self.words()
 
     def picture(self) -> str:
-        """Return an SVG document of what there is to see now, for a saved notebook; "" for none."""
+        """Return an SVG document of what was shown last, for a saved notebook; "" for none."""
+        return ""
+
+    @property
+    def standstill(self) -> str:
+        """Why the last look is not of now, as a sentence; empty if it is of now."""
         return ""
 
     def handle_control(self, message: dict[str, Any]) -> None:  # noqa: B027 - some views have no controls
@@ -111,7 +117,7 @@ class LiveView(ABC):
             self._widget = widget_class((*self.shared, self.script))(kind=self.script)
             self._widget.on_msg(self._on_message)
             self._refresh_widget()
-            self._widget.ended = self._why
+            self._widget.ended = self._end_text()
             if not self._why:
                 self._widget.observe(self._on_close, "comm")
                 self._widget.comm.on_close(self._on_close)
@@ -132,7 +138,13 @@ class LiveView(ABC):
             self._refresh_widget()
             slow = self._widget is not None and self._widget.number - self._drawn > PATIENCE
             self._due = time.monotonic() + (max(1.0, self.period) if slow else self.period)
+            if self._copy.is_due:
+                self._save_copy()
         return self._due
+
+    def take_last_look(self) -> None:
+        """Show what there is to see now, as it will soon be gone."""
+        self._refresh_widget()
 
     def end(self, why: str, *, close: bool = False) -> None:
         """Give back what the view holds, and say in it that nothing will come any more. Idempotent.
@@ -144,10 +156,10 @@ class LiveView(ABC):
             first, self._why = not self._why, self._why or why
         if first:
             ticker_of(self.session).forget(self)
-            self._keep_last_look()
+            self._save_copy()
             self.resources.close()
             if self._widget is not None:
-                self._widget.ended = why
+                self._widget.ended = self._end_text()
         if close or self._widget is None:
             registry_of(self.session).forget(self)
             if self._widget is not None:
@@ -175,16 +187,18 @@ class LiveView(ABC):
         data, metadata = self._repr_mimebundle_(**kwargs)
         display(data, metadata=metadata, raw=True)  # type: ignore[no-untyped-call]
         if len(data) > 1:
-            saved = saved_output(self.label, data["text/plain"], self.picture())
-            self._saved = display(saved, raw=True, display_id=True)  # type: ignore[no-untyped-call]
+            self._copy.show(data["text/plain"], self.picture())
 
-    def _keep_last_look(self) -> None:
-        """Put what was seen last into the output that a saved notebook shows."""
-        if self._saved is None:
-            return
-        with contextlib.suppress(Exception):  # what it shows may be gone: the first look stays
-            saved = saved_output(self.label, self._words, self.picture())
-            self._saved.update(saved, raw=True)
+    def _save_copy(self) -> None:
+        if self._widget is not None:
+            words = "\n\n".join(filter(None, [self._widget.notice, self._widget.words]))
+            self._copy.replace(words, self.picture())
+
+    def _end_text(self) -> str:
+        """Return why the view has ended, and of when its last picture is."""
+        if self._why and self._seen_at:
+            return f"{self._why} This is how it was at {self._seen_at}."
+        return self._why
 
     def _refresh_widget(self) -> None:
         with self._looking:
@@ -193,7 +207,7 @@ class LiveView(ABC):
                 return
             try:
                 frame, words = self.look()
-                words = self._words = truncate.cut_text(words, MAX_WORDS_CHARS)
+                words = truncate.cut_text(words, MAX_WORDS_CHARS)
                 text = json.dumps([frame, words])
                 self._stumbles = 0
             except Exception as error:  # noqa: BLE001 - a view must never take its thread down
@@ -203,7 +217,12 @@ class LiveView(ABC):
                 failed = f"This view has stopped ({type(error).__name__}: {error})."
                 self.end(CLOSED if self.session.closed else failed)
                 return
+            still = self.standstill
+            if not still:
+                self._seen_at = time.strftime("%H:%M:%S")
             if text == self._last:
+                if widget.notice != still:
+                    widget.notice = still
                 return
             late = bool(self.slow_parts) and time.monotonic() < self._slow_due
             self._last = "" if late else text
@@ -216,7 +235,7 @@ class LiveView(ABC):
             fixed = {name: frame.pop(name) for name in self.fixed_parts}
             slow = {name: frame.pop(name) for name in self.slow_parts}
             with widget.hold_sync():  # of what is set here, only what has changed is sent
-                widget.frame, widget.fixed, widget.notice = frame, fixed, ""
+                widget.frame, widget.fixed, widget.notice = frame, fixed, still
                 if not late:
                     widget.slow, widget.words = slow, words
                     self._slow_due = time.monotonic() + SLOW_PERIOD_S

@@ -39,7 +39,8 @@ def saved_output(label: str, words: str, picture: str = "") -> dict[str, str]:
     """
     note = (
         f"{label} as it was at {time.strftime('%Y-%m-%d %H:%M:%S')}. This is a saved copy and not "
-        "live: run this cell again to see what happens now."
+        "live: to see what happens now, run the cells above again, then this one (menu Run: Run "
+        "All Above Selected Cell)."
     )
     if len(words) > MAX_CHARS:
         words = f"{words[:MAX_CHARS]}\n[the rest was not saved]"

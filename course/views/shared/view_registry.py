@@ -24,6 +24,9 @@ _PACKAGE = str(Path(__file__).parents[2])
 class RegisteredView(Protocol):
     """What a view registry keeps."""
 
+    def take_last_look(self) -> None:
+        """Show what there is to see now, as it will soon be gone."""
+
     def end(self, why: str, *, close: bool = False) -> None:
         """Stop whatever it does, and say ``why``; ``close`` takes it off the page. Idempotent."""
 
@@ -39,6 +42,7 @@ class ViewRegistry:
     def __init__(self, session: CoreSession) -> None:
         """Keep views until ``session`` closes."""
         self._views: dict[RegisteredView, tuple[Hashable, Hashable]] = {}
+        session.before_close(self.take_last_looks)
         session.on_close(lambda: self.clear("The session has been closed."))
 
     def put(self, view: RegisteredView, about: Hashable) -> None:
@@ -69,6 +73,13 @@ class ViewRegistry:
         with _lock:
             self._views.pop(view, None)
             _left.pop(view, None)
+
+    def take_last_looks(self) -> None:
+        """Have all views show what there is now, before the session takes it down."""
+        with _lock:
+            views = list(self._views)
+        for view in views:
+            view.take_last_look()
 
     def clear(self, why: str) -> None:
         """End all views: they stay on the page, and say why, until their cells are run again."""

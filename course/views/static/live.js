@@ -9,7 +9,7 @@
 const SVG = "http://www.w3.org/2000/svg";
 const DEAD =
   "Not live any more: the kernel of this notebook was restarted or has ended. " +
-  "Run this cell again.";
+  "Run the cells above again, then this one (menu Run: Run All Above Selected Cell).";
 const ENDINGS = ["terminating", "restarting", "autorestarting", "dead"]; // of a kernel
 const CONFIRM_MS = 200; // between two confirmations: each makes the kernel say "busy" and "idle"
 const FOCUSABLE = "a, button, input, select, summary, textarea, [tabindex]";
@@ -97,6 +97,13 @@ function render({ model, el }) {
     alive();
     waiting ||= requestAnimationFrame(draw);
   };
+  // What is drawn to fit its place is drawn again when that changes, also when nothing else comes.
+  let width = 0;
+  const resized = new ResizeObserver(() => {
+    if (width === stage.clientWidth) return;
+    width = stage.clientWidth;
+    waiting ||= requestAnimationFrame(draw);
+  });
   const say = () => {
     const ended = model.get("ended");
     const over = dead ? DEAD : ended;
@@ -133,7 +140,9 @@ function render({ model, el }) {
   session?.statusChanged?.connect(kernelStatus);
   draw();
   say();
+  resized.observe(stage);
   return () => {
+    resized.disconnect();
     cancelAnimationFrame(waiting);
     document.removeEventListener("selectionchange", retell);
     model.off("change:number", refresh);

@@ -1,9 +1,9 @@
 // Lanes of topics: a stroke where something happened, stronger where much did; gaps shaded, drops
 // marked; rate and latency (median and 95th percentile) as lines below.
 
-const WIDTH = 760;
-const LABEL = 170;
-const LONGEST = 24; // characters of a label that LABEL has room for
+const WIDEST = 760; // px of the lanes; on a narrow page they are as wide as there is room
+const NARROWEST = 160;
+const CHARACTER = 7; // px of a label
 const LANE = 20;
 const PLOT = 40;
 const SPACE = 12;
@@ -13,13 +13,21 @@ const view = {
   start(stage) {
     return {
       draw(frame) {
-        stage.replaceChildren(...frame.topics.map((topic) => block(topic, frame)));
+        const size = sizes(stage.clientWidth);
+        stage.replaceChildren(...frame.topics.map((topic) => block(topic, frame, size)));
       },
     };
   },
 };
 
-function block(topic, frame) {
+/** How wide labels and lanes are in so many px: "now", at the end of the lanes, is always in sight. */
+function sizes(room) {
+  const label = room < 640 ? 110 : 170;
+  return { LABEL: label, WIDTH: Math.max(NARROWEST, Math.min(WIDEST, room - label - 10)) };
+}
+
+function block(topic, frame, size) {
+  const { LABEL, WIDTH } = size;
   const lanes = topic.lanes.length;
   const height = lanes * LANE + 2 * (PLOT + SPACE) + 22;
   const svg = shape("svg", {
@@ -38,7 +46,7 @@ function block(topic, frame) {
     const y = row * LANE;
     const most = Math.max(1, ...lane.counts);
     svg.append(shape("text", { x: LABEL - 8, y: y + 14, class: "rostimeline-label" },
-      shortened(lane.label), shape("title", {}, lane.label)));
+      shortened(lane.label, LABEL), shape("title", {}, lane.label)));
     svg.append(shape("line", { x1: LABEL, x2: LABEL + WIDTH, y1: y + LANE - 2, y2: y + LANE - 2 }));
     let path = "";
     lane.counts.forEach((count, place) => {
@@ -56,26 +64,27 @@ function block(topic, frame) {
     }
   });
   svg.append(
-    ...plot("rate", "Hz", 1, [["rostimeline-rate", topic.rate]], lanes * LANE + SPACE),
+    ...plot("rate", "Hz", 1, [["rostimeline-rate", topic.rate]], lanes * LANE + SPACE, size),
     ...plot("latency p50, p95", "ms", 2, [["rostimeline-p50", topic.p50], ["rostimeline-p95", topic.p95]],
-      lanes * LANE + 2 * SPACE + PLOT),
+      lanes * LANE + 2 * SPACE + PLOT, size),
   );
   const base = height - 4;
   svg.append(
     shape("text", { x: LABEL, y: base }, `${-frame.window} s`),
-    shape("text", { x: LABEL + WIDTH, y: base, class: "rostimeline-label" }, "now"),
+    shape("text", { x: LABEL + WIDTH, y: base, class: "rostimeline-label rostimeline-now" }, "now"),
   );
   return make("div", {}, make("p", { class: "rostimeline-title" },
     make("strong", {}, topic.name), ` ${topic.text}`), svg);
 }
 
 /** A label that fits its place: the end of a name tells more than its beginning. */
-function shortened(label) {
-  return label.length <= LONGEST ? label : `…${label.slice(1 - LONGEST)}`;
+function shortened(label, room) {
+  const most = Math.floor(room / CHARACTER);
+  return label.length <= most ? label : `…${label.slice(1 - most)}`;
 }
 
 /** Lines over one axis from 0 to the largest value; a part of the window without a value is skipped. */
-function plot(name, unit, digits, lines, top) {
+function plot(name, unit, digits, lines, top, { LABEL, WIDTH }) {
   const values = lines.flatMap(([, line]) => line.filter((value) => value !== null));
   const most = Math.max(10 ** -digits, ...values);
   const drawn = lines.map(([style, line]) => {

@@ -10,7 +10,7 @@ import datetime
 import json
 import os
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -39,10 +39,11 @@ class JournalError(CourseError):
 
 @dataclass(frozen=True)
 class Checked:
-    """What the visible checks of an exam found when they ran last.
+    """What the visible checks of an exam found when they ran last, and when they found the best.
 
-    ``when`` is UTC in ISO 8601; ``score`` and ``best`` (the most so far) are of ``max_score``
-    points; ``passed`` and ``open`` are titles of checks.
+    ``when`` and ``score`` are of the last run, in UTC as ISO 8601 and of ``max_score`` points;
+    ``best`` is the most so far, with the titles of the checks that ``passed`` and were ``open``
+    then: a check that runs before the cells with the work has run takes nothing away.
     """
 
     when: str
@@ -111,10 +112,12 @@ class Journal:
 
         def add(entries: Entries) -> None:
             before = entries.checks.pop(exam, None)
-            best = max(score, before.best if before and before.max_score == max_score else 0.0)
-            entries.checks[exam] = Checked(
-                _utc_now(), score, max_score, best, _limit_titles(passed), _limit_titles(left)
+            found = Checked(
+                _utc_now(), score, max_score, score, _limit_titles(passed), _limit_titles(left)
             )
+            if before and before.max_score == max_score and before.best > score:
+                found = replace(before, when=found.when, score=score)
+            entries.checks[exam] = found
             for oldest in list(entries.checks)[:-MAX_EXAMS]:
                 del entries.checks[oldest]
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from course.workspace.journal.student_notebooks import StudentNotebook
+from course.workspace.journal.time_needed import format_minutes
 from course.workspace.journal.work import Chapter, ExerciseWork, QuizTaken, WorkDone
 
 NAMED = 4
@@ -34,6 +35,8 @@ def render_markdown(progress: WorkDone, start: Path) -> str:
             lines.append((_notebook_link(progress, notebook, start), *map(_escape_markdown, row)))
         parts.append("\n".join(f"| {' | '.join(line)} |" for line in lines))
     parts += [f"**Note:** {_escape_markdown(notice)}" for notice in progress.notices]
+    if hand_in := _format_hand_in(progress):
+        parts.append(f"**To hand in:** {_escape_markdown(hand_in)}")
     parts.append(_escape_markdown(_format_foot(progress)))
     return "\n\n".join(parts)
 
@@ -48,7 +51,10 @@ def render_text(progress: WorkDone) -> str:
         for notebook, row in rows:
             lines += ["", f"{head[0]}: {notebook.title} ({notebook.path})"]
             lines += [f"  {name}: {value}" for name, value in zip(head[1:], row, strict=True)]
-    lines += ["", *(f"Note: {notice}" for notice in progress.notices), _format_foot(progress)]
+    lines += ["", *(f"Note: {notice}" for notice in progress.notices)]
+    if hand_in := _format_hand_in(progress):
+        lines.append(f"To hand in: {hand_in}")
+    lines.append(_format_foot(progress))
     return "\n".join(lines)
 
 
@@ -88,40 +94,40 @@ def _next_step(progress: WorkDone) -> tuple[StudentNotebook, str] | None:
 
 def _progress_tables(progress: WorkDone) -> Iterator[tuple[Row, list[tuple[StudentNotebook, Row]]]]:
     if progress.chapters:
-        head: Row = ("Chapter", "Cells run", "Still to run")
+        head: Row = ("Chapter", "Takes about", "Cells run", "Still to run")
         yield head, [(chapter.notebook, _chapter_row(chapter)) for chapter in progress.chapters]
     if progress.exercises:
-        head = ("Exercise", "Visible checks", "Still open", "Explanations")
+        head = ("Exercise", "Takes about", "Visible checks", "Still open", "Explanations")
         yield head, [(e.notebook, _exercise_row(e, progress.moment)) for e in progress.exercises]
     if progress.quizzes:
-        head = ("Quiz", "Passed", "Best attempt", "Attempts")
+        head = ("Quiz", "Takes about", "Passed", "Best attempt", "Attempts")
         yield head, [(quiz.notebook, _quiz_row(quiz)) for quiz in progress.quizzes]
 
 
 def _chapter_row(chapter: Chapter) -> Row:
     left = _list_titles(section.title for section in chapter.unfinished_sections)
-    return f"{chapter.done} of {chapter.total}", left
+    takes = format_minutes(chapter.notebook.minutes)
+    return takes, f"{chapter.done} of {chapter.total}", left
 
 
 def _exercise_row(exercise: ExerciseWork, now: datetime.datetime) -> Row:
     written, to_write = exercise.notebook.written, exercise.notebook.to_write
     explanations = f"{written} of {to_write} written" if to_write else "none asked for"
     found = exercise.checked
+    takes = format_minutes(exercise.notebook.minutes)
     if found is None:
-        return "not checked yet", "all", explanations
-    best = f", best {found.best:g}" if found.best > found.score else ""
-    points = f"{found.score:g} of {found.max_score:g} points"
-    return (
-        f"{points} ({_format_moment(found.when, now)}{best})",
-        _list_titles(found.open),
-        explanations,
-    )
+        return takes, "not checked yet", "all", explanations
+    moment = _format_moment(found.when, now)
+    last = f"at best; {found.score:g} last, {moment}" if found.best > found.score else moment
+    points = f"{found.best:g} of {found.max_score:g} points ({last})"
+    return takes, points, _list_titles(found.open), explanations
 
 
 def _quiz_row(quiz: QuizTaken) -> Row:
     best = quiz.best_attempt
     score = f"{best.score:g} of {len(best.answers)}" if best else "none yet"
-    return "yes" if quiz.is_passed else "not yet", score, str(len(quiz.attempts))
+    takes = format_minutes(quiz.notebook.minutes)
+    return takes, "yes" if quiz.is_passed else "not yet", score, str(len(quiz.attempts))
 
 
 def _list_titles(titles: Iterable[str]) -> str:
@@ -135,6 +141,20 @@ def _format_moment(stamp: str, now: datetime.datetime) -> str:
     if moment.date() == now.date():
         return f"today, {moment:%H:%M}"
     return f"{moment.day} {moment:%b %Y, %H:%M}"
+
+
+def _format_hand_in(progress: WorkDone) -> str:
+    """Return which folders a student hands in, and how; empty if there is nothing to hand in."""
+    parts: list[StudentNotebook] = [exercise.notebook for exercise in progress.exercises]
+    parts += [quiz.notebook for quiz in progress.quizzes]
+    folders = sorted({notebook.path.parent.as_posix() for notebook in parts})
+    if not folders:
+        return ""
+    named = " and ".join([", ".join(folders[:-1]), folders[-1]] if folders[1:] else folders)
+    return (
+        f"save your notebooks, and give your instructor all files of {named}, each folder as it is "
+        "(a quiz's answers are in its .attempts.jsonl file), in the way that they have named."
+    )
 
 
 def _format_foot(progress: WorkDone) -> str:

@@ -8,12 +8,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from course.workspace.journal.time_needed import estimate_minutes
+
 MAX_FILE_BYTES = 64 * 1024 * 1024  # bytes; outputs and pictures are in the file, too
 STUB = "Your answer goes here"
 """Words of the text that stands where an answer is to be written."""
 
 BEGINNING = "The beginning"
 """Title of the cells before a chapter's first section."""
+
+_OURS = re.compile(r"[0-9a-f]{12}(-\d+)?")
+"""Id of a cell of a chapter, as `autograder build` gives it. A cell that a student has made has
+another one: JupyterLab's has more digits, other editors' fewer."""
 
 _HEADING = re.compile(r"(#{1,3}) (.+)")
 _CHECK = re.compile(r"^check\(\s*[\"']([\w-]+)[\"']\s*\)", re.MULTILINE)
@@ -35,11 +41,13 @@ class StudentNotebook:
     Attributes:
         path: its file, relative to the working copy.
         title: its first heading.
-        sections: those with cells to run, in order.
+        sections: those with cells of the course to run, in order; a student's own cells and empty
+            ones are none.
         exam: name of the exam whose check cell it has; empty if none.
         quiz: name of the quiz that it shows; empty if none.
         written: how many of its answers in words have been written.
         to_write: how many answers in words it asks for.
+        minutes: how long it takes to work through, as an estimate.
         problem: why it cannot be read; empty if it can.
     """
 
@@ -50,6 +58,7 @@ class StudentNotebook:
     quiz: str = ""
     written: int = 0
     to_write: int = 0
+    minutes: int = 0
     problem: str = ""
 
 
@@ -69,11 +78,20 @@ def read_notebook(folder: Path, path: Path) -> StudentNotebook:
     code = "\n".join(cell.source for cell in cells if cell.code)
     titles = [title for cell in cells for _, title in cell.headings]
     answers = [cell.source for cell in cells if cell.by_hand and not cell.code]
+    quiz = _first_match(_QUIZ, code)
     return StudentNotebook(
         path, titles[0] if titles else path.stem, _find_sections(cells),
-        _first_match(_CHECK, code), _first_match(_QUIZ, code),
+        _first_match(_CHECK, code), quiz,
         sum(bool(answer.strip()) and STUB not in answer for answer in answers), len(answers),
+        _estimate_minutes(cells, len(answers), quiz=bool(quiz)),
     )  # fmt: skip
+
+
+def _estimate_minutes(cells: list[_Cell], answers: int, *, quiz: bool) -> int:
+    words = sum(len(cell.source.split()) for cell in cells if not cell.code and not cell.by_hand)
+    run = sum(cell.code for cell in cells if cell.source.strip())
+    tasks = sum(cell.code and cell.is_task for cell in cells)
+    return estimate_minutes(words, run, tasks, answers, quiz=quiz)
 
 
 class _Cell:
@@ -83,6 +101,7 @@ class _Cell:
         self.code = cell["cell_type"] == "code"
         self.id = str(cell.get("id", ""))
         settings = cell.get("metadata", {}).get("nbgrader") or {}
+        self.is_task = bool(settings.get("solution"))
         self.by_hand = bool(settings.get("grade") and settings.get("solution"))
         self.headings: list[tuple[int, str]] = []
         if not self.code:
@@ -98,7 +117,7 @@ def _find_sections(cells: list[_Cell]) -> tuple[Section, ...]:
             path = {n: title if n == level else (path[n] if n < level else "") for n in path}
             name = ": ".join(path[n] for n in (2, 3) if path[n])
             sections.append((name or BEGINNING, []))
-        if cell.code:
+        if cell.code and cell.source.strip() and _OURS.fullmatch(cell.id):
             if not sections:
                 sections.append((BEGINNING, []))
             sections[-1][1].append(cell.id)

@@ -167,13 +167,13 @@ def test_the_graph_has_every_node_and_link() -> None:
     assert bundle["text/plain"] == repr(small())
     assert bundle["text/vnd.mermaid"].splitlines() == [
         "flowchart LR",
-        '  n0["<b>lidar</b>"]',
-        '  n1["<b>reflex</b>"]',
-        '  l0(["/scan<br/><small>LaserScan</small>"])',
-        "  n0 --> l0",
-        "  l0 --> n1",
-        '  l1(["/motors/command<br/><small>Twist</small>"])',
-        "  n1 --> l1",
+        '  n0(["<b>lidar</b>"])',
+        '  n1(["<b>reflex</b>"])',
+        '  l0["/scan<br/><small>LaserScan</small>"]',
+        '  n0 -- "best effort · volatile · 5" --> l0',
+        '  l0 -- "best effort · volatile · 5" --> n1',
+        '  l1["/motors/command<br/><small>Twist</small>"]',
+        '  n1 -- "reliable · volatile · 10" --> l1',
         "  l1 --> ol1((outside))",
     ]
 

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import pytest
+
+from course import Design
 from course.graph import layout
+from course.graph.labels import LINE_PX, Rectangle, label_width
 from course.graph.mermaid import draw_mermaid
-from course.graph.model import Endpoint, Graph, Mismatch, Topic
+from course.graph.model import Endpoint, Exchange, Graph, Mismatch, Topic
 
 TYPE = "std_msgs/msg/String"
+
+
+WHY = "offers BEST_EFFORT, requests RELIABLE"
+QOS = {"reliability": "RELIABLE", "durability": "VOLATILE", "history": "KEEP_LAST", "depth": "10"}
 
 
 def robot(*topics: str, refused: str = "") -> Graph:
@@ -16,9 +24,9 @@ def robot(*topics: str, refused: str = "") -> Graph:
         tuple(
             Topic(
                 name,
-                (Endpoint("/camera", "publisher", TYPE),),
-                (Endpoint("/display", "subscription", TYPE),),
-                (Mismatch("/camera", "/display", ("",), ("RELIABILITY",)),) * (name == refused),
+                (Endpoint("/camera", "publisher", TYPE, {**QOS, "reliability": "BEST_EFFORT"}),),
+                (Endpoint("/display", "subscription", TYPE, QOS),),
+                (Mismatch("/camera", "/display", (WHY,), ("RELIABILITY",)),) * (name == refused),
             )
             for name in topics
         ),
@@ -41,13 +49,69 @@ def test_arrows_that_end_at_one_box_end_beside_each_other() -> None:
     assert len({y for y, _ in topics}) == 3
 
 
-def test_a_label_has_room_between_the_boxes() -> None:
-    drawing = layout.draw_graph(robot("/a", "/b", refused="/b"))
-    (label,) = (line for line in drawing.lines if line.label)
-    assert (label.label, label.bad) == ("reliability", True)
-    half = len(label.label) * 8 / 2
-    for box in drawing.boxes:
-        assert box.x + box.width < label.x - half or label.x + half < box.x
+@pytest.mark.parametrize("way", layout.WAYS)
+def test_each_arrow_says_its_qos_where_nothing_else_stands(way: layout.Way) -> None:
+    drawing = layout.draw_graph(robot("/a", "/b", refused="/b"), way)
+    assert [line.qos for line in drawing.lines if not line.bad] == [
+        "best effort · volatile · 10",
+        "reliable · volatile · 10",
+    ]
+    (broken,) = (line for line in drawing.lines if line.reasons)
+    assert broken.bad
+    assert " ".join(broken.reasons) == "reliability: offers best effort, requests reliable"
+    taken = [Rectangle(b.x, b.y, b.x + b.width, b.y + b.height) for b in drawing.boxes]
+    for line in drawing.lines:
+        texts = (line.qos, *line.reasons)
+        half, top = label_width(texts) / 2, line.y - LINE_PX / 2
+        place = Rectangle(line.x - half, top, line.x + half, top + LINE_PX * len(texts))
+        assert not any(place.overlap(other) for other in taken)
+        assert place.left >= drawing.left
+        assert place.right <= drawing.left + drawing.width
+        taken.append(place)
+
+
+def test_a_tall_drawing_is_narrow_and_flows_downwards() -> None:
+    wide, tall = (layout.draw_graph(robot("/a", "/b"), way) for way in layout.WAYS)
+    assert tall.width < wide.width / 1.5
+    tops = [{box.y for box in tall.boxes if box.label == name} for name in ("/camera", "/a")]
+    assert max(tops[0]) < min(tops[1])
+
+
+def test_what_nobody_uses_stands_beside_its_server() -> None:
+    graph = robot("/a")
+    sent, read = Endpoint("/display", "publisher", TYPE), Endpoint("/last", "subscription", TYPE)
+    graph = Graph(
+        (*graph.nodes, "/last"),
+        (*graph.topics, Topic("/b", (sent,), (read,))),
+        (Exchange("/lamp", "std_srvs/srv/SetBool", ("/last",)),),
+    )
+    boxes = {box.label: box for box in layout.draw_graph(graph, "tall").boxes}
+    assert boxes["/lamp"].y == boxes["/b"].y
+
+
+def test_arrows_touch_the_outline_of_an_ellipse() -> None:
+    drawing = layout.draw_graph(robot("/a", "/b", "/c"))
+    display = next(box for box in drawing.boxes if box.label == "/display")
+    a, b = display.width / 2, display.height / 2
+    for line in drawing.lines:
+        x, y = map(float, line.path.rpartition(" ")[2].split(","))
+        if "requests" in line.tip:
+            share = ((x - display.x - a) / a) ** 2 + ((y - display.y - b) / b) ** 2
+            assert share == pytest.approx(1, abs=0.01)
+
+
+def test_one_convention_for_the_shapes_of_every_drawing() -> None:
+    graph = draw_mermaid(robot("/a"))
+    design = Design()
+    design.node("camera").publishes("/a", TYPE, 10)
+    drawn = design._repr_mimebundle_()["text/vnd.mermaid"]
+    assert '(["/camera"])' in graph
+    assert '(["<b>camera</b>"])' in drawn
+    assert '["/a<br/>String"]' in graph.replace("([", "")
+    assert '["/a<br/><small>String</small>"]' in drawn.replace("([", "")
+    shapes = {box.kind: box.outline for box in layout.draw_graph(robot("/a")).boxes}
+    assert " a" in shapes["node"], "an ellipse"
+    assert " a" not in shapes["topic"], "a box"
 
 
 def crowd(writers: str, readers: str, *broken: str) -> tuple[Graph, set[str], dict[str, str]]:
@@ -59,13 +123,13 @@ def crowd(writers: str, readers: str, *broken: str) -> tuple[Graph, set[str], di
                 "/t",
                 tuple(Endpoint(f"/{name}", "publisher", TYPE) for name in writers),
                 tuple(Endpoint(f"/{name}", "subscription", TYPE) for name in readers),
-                tuple(Mismatch(f"/{w}", f"/{r}", ("",), ("DURABILITY",)) for w, r in broken),
+                tuple(Mismatch(f"/{w}", f"/{r}", (), ("DURABILITY",)) for w, r in broken),
             ),
         ),
     )
     lines = layout.draw_graph(graph).lines
     red = {line.tip[1] for line in lines if line.bad}
-    return graph, red, {line.tip[1]: line.label for line in lines if line.label}
+    return graph, red, {line.tip[1]: line.reasons[0] for line in lines if line.reasons}
 
 
 def test_a_broken_pair_is_red_from_end_to_end_and_says_why_once() -> None:

@@ -180,7 +180,7 @@ def test_the_mermaid_text_names_everything_once_and_marks_what_is_broken(session
     assert text.splitlines()[0] == "flowchart LR"
     for name in ("/talker", "/listener", "/chatter<br/>String"):
         assert text.count(name) == 1
-    assert '-. "reliability does not fit" .-x' in text
+    assert '-. "reliable · volatile · 10<br/>reliability does not fit" .-x' in text
     assert "linkStyle 0,1 stroke:#c00" in text, "the whole way is red"
     assert view.mermaid._repr_mimebundle_()["text/vnd.mermaid"] == text
 

@@ -9,6 +9,8 @@ import nbformat
 import pytest
 from nbclient import NotebookClient
 
+from course.interfaces.building.toolchain import compiler_problem
+
 SETUP = """
 from course import interfaces
 from course.interfaces import magic
@@ -32,6 +34,22 @@ def run(cells: list[str], folder: Path) -> list[list[Any]]:
     client.execute()
     assert notebook.cells[0].outputs == []
     return [cell.outputs for cell in notebook.cells[1:]]
+
+
+def test_an_import_that_builds_says_so_before_and_only_then(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if problem := compiler_problem():
+        pytest.skip(problem)
+    monkeypatch.setenv("COURSE_INTERFACES_CACHE", str(tmp_path / "cache"))
+    said = "print('imported')\nfrom example_interfaces.srv import SetBool\nprint(SetBool.__name__)"
+    first, again = run([said], tmp_path)[0], run([said], tmp_path)[0]
+    text = "".join(output.text for output in first)
+    assert text.index("example_interfaces is being compiled on this machine") < text.index(
+        "SetBool"
+    )
+    assert "once: it is kept for the next time." in text
+    assert [output.text for output in again] == ["imported\nSetBool\n"]
 
 
 def only_error(outputs: list[Any]) -> str:

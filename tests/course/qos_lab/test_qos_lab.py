@@ -16,6 +16,7 @@ from course.qos_lab import experiment_runner, link, rules
 from course.qos_lab.experiment import COUNT, Experiment, ExperimentOutcome
 from course.qos_lab.experiment_runner import ExperimentError
 from course.qos_lab.profile import Profile, ProfileError
+from course.views.qos_lab import LabTrial
 from tests.machine import needs_lossy_link
 
 
@@ -329,3 +330,43 @@ def test_the_tools_of_a_lossy_link_are_found_by_an_ordinary_user(
     outcome = experiment_runner.run_experiment(experiment)
     assert (outcome.remark, outcome.lossy) == ("", True)
     assert outcome.missing_count > 0
+
+
+def trial(experiment: Experiment, predicted: int, arrived: int) -> LabTrial:
+    outcome = ExperimentOutcome(
+        connected=True, sent=COUNT, received=list(range(arrived)), lossy=experiment.loss > 0
+    )
+    return LabTrial(experiment, True, predicted, outcome)
+
+
+def test_a_prediction_of_a_random_loss_is_right_as_near_as_chance_allows() -> None:
+    half = Experiment(best_effort(), best_effort(), "stream", loss=50)
+    assert rules.chance_margin(half) == 6  # 2 * sqrt(30 * 0.5 * 0.5) = 5.5
+    right = [n for n in range(COUNT + 1) if trial(half, 15, n).is_right]
+    assert right == list(range(9, 22))
+    assert trial(half, 30, 12).is_right is False
+    assert trial(half, 0, 12).is_right is False
+
+
+def test_where_the_rules_decide_a_prediction_is_exact() -> None:
+    for exact in (
+        Experiment(),
+        Experiment(loss=50, offered=Profile(depth=COUNT), requested=Profile(depth=COUNT)),
+        Experiment(Profile(), Profile(depth=1), "slow reader"),
+    ):
+        assert rules.chance_margin(exact) == 0
+        expected = rules.expected_count(exact)
+        assert expected is not None
+        assert trial(exact, expected, expected).is_right
+        assert not trial(exact, expected - 1, expected).is_right
+    # A machine that cannot lose packets has lost none: nothing was left to chance.
+    lossless = trial(Experiment(best_effort(), best_effort(), "stream", loss=50), 15, COUNT)
+    assert lossless.outcome is not None
+    lossless.outcome.lossy = False
+    assert not lossless.is_right
+
+
+def test_the_verdict_says_that_chance_was_allowed_for(session: Session) -> None:
+    lab = session.qos_lab()
+    lab._keep_trial(trial(Experiment(best_effort(), best_effort(), "stream", loss=50), 15, 12))
+    assert "connected, 15 messages. That was right. (The loss is random: up to 6" in lab.words()

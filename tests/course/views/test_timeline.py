@@ -22,7 +22,8 @@ from std_msgs.msg import String
 from course import Session
 from course.errors import SessionError, WaitTimeout
 from course.messages.mcap_file import RecordingError
-from course.views.timeline import Timeline, describe_figures
+from course.views.timeline import Timeline
+from course.views.timeline_words import describe_figures
 from course.watch import callbacks, timeline
 from course.watch.callbacks import CallbackTap
 from course.watch.timeline import Passage

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import threading
 import time
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from typing import Any
 
@@ -80,7 +81,7 @@ def test_what_has_not_changed_is_not_sent_again(session: Session) -> None:
     assert view.widget.number == number
 
 
-def test_a_new_node_appears_and_a_stopped_one_goes(session: Session) -> None:
+def test_a_new_node_appears_a_stopped_one_goes_and_the_last_graph_stays(session: Session) -> None:
     view = GraphView(session)
 
     def labels() -> set[str]:
@@ -94,9 +95,16 @@ def test_a_new_node_appears_and_a_stopped_one_goes(session: Session) -> None:
         return node
 
     session.run(talker)
+    session.run(Node, "other")
+    session.until(lambda: labels() == {"/talker", "/chatter", "/other"})
+    session.stop("other")
     session.until(lambda: labels() == {"/talker", "/chatter"})
     session.stop("talker")
-    session.until(lambda: labels() == set())
+    session.until(lambda: "No node runs any more since" in view.widget.notice)
+    assert labels() == {"/talker", "/chatter"}
+    assert view.words() == "No nodes."
+    session.run(Node, "other")
+    session.until(lambda: labels() == {"/other"} and not view.widget.notice)
 
 
 def test_a_closed_session_ends_its_views_and_their_thread() -> None:
@@ -104,8 +112,26 @@ def test_a_closed_session_ends_its_views_and_their_thread() -> None:
         view = GraphView(session)
         assert view.widget.ended == ""
         assert len(views_threads()) == 1
-    assert view.widget.ended == "The session has been closed."
+    assert re.fullmatch(
+        r"The session has been closed. This is how it was at \d\d:\d\d:\d\d\.", view.widget.ended
+    )
     assert views_threads() == []
+
+
+def test_a_session_that_closes_is_looked_at_a_last_time() -> None:
+    with Session() as session:
+        view = GraphView(session)
+        view.period = 60.0  # s: no look but the first and the last
+        assert not view.widget.frame["boxes"]
+        session.run(Node, "late")
+    (box,) = view.widget.frame["boxes"]
+    assert box["label"] == "/late"
+
+
+def test_a_session_closes_whatever_its_last_look_raises() -> None:
+    with Session() as session:
+        session.before_close(lambda: 1 / 0)
+    assert session.closed
 
 
 def test_a_view_that_fails_says_so_and_the_others_go_on(session: Session) -> None:
@@ -207,8 +233,36 @@ def test_in_a_kernel_a_view_leaves_its_words_for_a_reader_without_one(kernel: Ke
     (_, live_words), (_, note) = shown
     assert live_words == "No nodes."
     assert re.match(
-        r"ROS graph as it was at \d{4}-\d\d-\d\d \d\d:.* not live: run this cell again", note
+        r"ROS graph as it was at \d{4}-\d\d-\d\d \d\d:.* not live: to see what happens now", note
     )
+
+
+SHOWN_LATER = """
+import base64, re
+shown = []
+def keep(data, metadata=None, *, transient=None, update=False, **_):
+    shown.append((update, (transient or {}).get("display_id"), data))
+get_ipython().display_pub.publish = keep
+session = course.session()
+session.graph()
+"""
+
+
+def test_what_a_view_shows_last_takes_the_place_of_its_first_copy(kernel: Kernel) -> None:
+    kernel.run("import course\nfrom rclpy.node import Node")
+    assert kernel.run(SHOWN_LATER) == ("ok", [])
+    kernel.run("talker = course.run(Node, 'talker')")
+    status, said = kernel.run(
+        "course.close()\n"
+        "updates = [(key, data['text/html']) for update, key, data in shown if update]\n"
+        "first = [key for update, key, data in shown if not update and key]\n"
+        "assert updates and {key for key, _ in updates} == set(first), shown\n"
+        "picture = re.search(r'base64,([^\"]+)', updates[-1][1])[1]\n"
+        "print(base64.b64decode(picture).decode())"
+    )
+    assert status == "ok", said
+    picture = ElementTree.fromstring(said[0][1])
+    assert "/talker" in [element.text for element in picture.iter() if element.tag.endswith("text")]
 
 
 def test_saved_words_are_escaped_and_bounded() -> None:

@@ -43,7 +43,7 @@ def test_cells_and_checks_are_remembered(journal: Journal) -> None:
     assert list(entries.cells) == ["a", "b"]
     found = entries.checks["qos"]
     assert (found.score, found.best, found.max_score) == (8.0, 9.0, 10.0)
-    assert (found.passed, found.open) == (("starts",), ("flows", "newest"))
+    assert (found.passed, found.open) == (("starts", "flows"), ("newest",)), "those of the best"
     assert entries.notice == ""
 
 

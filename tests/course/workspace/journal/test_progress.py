@@ -21,6 +21,8 @@ from course.workspace import working_copy
 from course.workspace.content import CONFIG, content_root
 from course.workspace.journal.journal_file import FILE, MANIFEST, Journal
 from course.workspace.journal.progress import WELCOME
+from course.workspace.journal.student_notebooks import read_notebook
+from course.workspace.journal.time_needed import format_minutes
 from quizzes.bank import selection
 from quizzes.bank.loader import load_bank
 from quizzes.notebook.quiz import Quiz
@@ -125,6 +127,52 @@ def test_what_was_run_checked_written_and_passed_counts(folder: Path) -> None:
     assert (progress.quizzes[0].is_passed, len(progress.quizzes[0].attempts)) == (True, 1)
     assert f"1 of {len(EXERCISES)} exercises ready to hand in, the quiz passed." in repr(progress)
     assert "Best attempt: 5 of 5" in repr(progress)
+
+
+def test_own_and_empty_cells_do_not_keep_a_chapter_from_being_done(folder: Path) -> None:
+    for cell in ids(folder / CHAPTER):
+        Journal(folder).record_run(cell)
+    notebook = json.loads((folder / CHAPTER).read_text(encoding="utf-8"))
+    empty, own = ({"cell_type": "code", "source": text, "metadata": {}, "outputs": [],
+                   "execution_count": None} for text in ("", "1 / 0"))  # fmt: skip
+    notebook["cells"].append({**empty, "id": "0123456789ab"})
+    notebook["cells"].insert(5, {**own, "id": "6d2f9a3c-5d0e-4a52-9d1f-0c9a3b7e1f11"})
+    (folder / CHAPTER).write_text(json.dumps(notebook), encoding="utf-8")
+    (chapter,) = course.progress().chapters
+    assert chapter.done == chapter.total == len(ids(folder / CHAPTER)) - 2
+    assert chapter.unfinished_sections == ()
+    assert "Next: ch05-building-blocks" not in repr(course.progress())
+
+
+def test_the_cells_that_are_built_are_all_known_as_the_courses(folder: Path) -> None:
+    for path in (content_root() / "chapters").glob("*.ipynb"):
+        shutil.copy(path, folder / path.name)
+        found = read_notebook(folder, Path(path.name))
+        assert [cell for s in found.sections for cell in s.cells] == ids(folder / path.name)
+
+
+def test_a_check_before_the_work_has_run_takes_nothing_away(folder: Path) -> None:
+    journal = Journal(folder)
+    journal.record_checks("qos", 10.0, 10.0, ["It starts.", "It moves."], [])
+    write_explanations(folder / EXERCISE)
+    journal.record_checks("qos", 0.0, 10.0, [], ["It starts.", "It moves."])
+    assert course.progress().exercises[0].is_done
+    assert "10 of 10 points (at best; 0 last, today, " in repr(course.progress())
+    journal.record_checks("qos", 10.0, 10.0, ["It starts.", "It moves."], [])
+    assert "10 of 10 points (today, " in repr(course.progress())
+
+
+def test_it_says_how_long_a_part_takes_and_how_to_hand_in(folder: Path) -> None:
+    progress = course.progress()
+    (chapter,) = progress.chapters
+    assert 30 <= chapter.notebook.minutes <= 180
+    assert all(20 <= exercise.notebook.minutes <= 240 for exercise in progress.exercises)
+    assert progress.quizzes[0].notebook.minutes in (10, 20)
+    text = repr(progress)
+    assert text.count("  Takes about: ") == 2 + len(EXERCISES)
+    assert "give your instructor all files of ch05 and ch05-quiz, each folder as it is" in text
+    assert "**To hand in:** save your notebooks" in progress._repr_markdown_()
+    assert [format_minutes(minutes) for minutes in (10, 60, 70)] == ["10 min", "1 h", "1 h 10 min"]
 
 
 def test_next_leads_through_everything_and_ends(folder: Path) -> None:

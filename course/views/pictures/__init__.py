@@ -1,0 +1,1 @@
+"""What views show as SVG documents: for notebooks that are read without a kernel."""
