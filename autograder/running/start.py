@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from autograder.examination import points
 from autograder.examination.draws import fresh_seed
 from autograder.examination.subject import hang_report
-from autograder.examination.verdict import Verdict, VerdictError
+from autograder.examination.verdict import Progress, Verdict, VerdictError
 from autograder.processes import python_module
 from autograder.processes.channel import parse_line
 from autograder.processes.descriptors import readable_descriptors
@@ -113,6 +113,7 @@ class ExaminerProcess:
         pid: int,
         seed: int | None = None,
         last: bool = False,
+        follows: bool = False,
     ) -> None:
         """Ask for parts of an exam; their verdicts come one by one with `verdict`.
 
@@ -122,6 +123,7 @@ class ExaminerProcess:
             pid: the subject's process, for an examiner that looks at it itself.
             seed: what the exam's numbers are drawn from; one that nobody knows if left out.
             last: nothing of the notebook runs after it, so in a sandbox nothing is taken down.
+            follows: `verdict` is to be told of each check before it is made.
         """
         self._asked = deque((exam, part) for part, _ in parts)
         self._send_message(
@@ -131,15 +133,20 @@ class ExaminerProcess:
                 "pid": pid,
                 "seed": fresh_seed() if seed is None else seed,
                 "last": last,
+                "follows": follows,
             }
         )
 
     def verdict(
-        self, timeout: float = EXAM_TIMEOUT_S, answer_with: Answering | None = None
+        self,
+        timeout: float = EXAM_TIMEOUT_S,
+        answer_with: Answering | None = None,
+        follow: Callable[[Progress], object] | None = None,
     ) -> Verdict:
         """Return the verdict of the next part that was asked for.
 
-        ``answer_with`` answers what the examiner asks for meanwhile (see `program_host`).
+        ``answer_with`` answers what the examiner asks for meanwhile (see `program_host`), and
+        ``follow`` is told how far it is, if the request said so.
 
         Raises:
             ExaminerError: the examiner ended, took longer than ``timeout`` seconds, asked for too
@@ -152,6 +159,9 @@ class ExaminerProcess:
                 answer = parse_line(line)
                 if not isinstance(answer, dict):
                     raise TypeError("it is no JSON object")
+                if follow is not None and "progress" in answer:
+                    follow(Progress.from_data(answer["progress"]))
+                    continue
                 if answer_with is None or "wants" not in answer:
                     return self._verdict_of(answer)
             except (ValueError, LookupError, TypeError, RecursionError, VerdictError) as error:

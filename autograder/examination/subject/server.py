@@ -28,7 +28,7 @@ from autograder.examination.subject.student_errors import (
     student_trace,
 )
 from autograder.examination.subject.wall_waits import wall_waits
-from autograder.processes.channel import Channel, ChannelClosed
+from autograder.processes.channel import Channel, ChannelClosed, ChannelTimeout
 from course.runtime.context.context import default_context_beside
 from course.runtime.core_session import CoreSession
 from course.runtime.requests.service_ends import count_known_clients, count_known_servers
@@ -39,6 +39,9 @@ MAX_VALUE_CHARS = 64 * 1024
 
 MAX_NOTES = 500
 """Characters that are told of the error of a cell."""
+
+BETWEEN_S = 0.2
+"""Seconds between two calls of what is done between requests."""
 
 LAST_CALLBACKS_S = 0.5  # that callbacks of an exam's earlier session are given to end
 MOST_CLEANUPS = 100
@@ -64,11 +67,14 @@ class SubjectServer:
         self._raised: list[Exception | SystemExit] = []
         self._threads = ThreadErrors()
 
-    def serve(self, channel: Channel) -> None:
-        """Answer requests until the examiner says that it is done or goes away."""
+    def serve(self, channel: Channel, between: Callable[[], object] | None = None) -> None:
+        """Answer requests until the examiner says that it is done or goes away.
+
+        ``between`` is called between two requests, and every `BETWEEN_S` while none comes.
+        """
         with self._threads, _as_in_a_program():
             try:
-                while (request := channel.receive())["op"] != "done":
+                while (request := _next_request(channel, between))["op"] != "done":
                     channel.send(self._answer(request))
             except ChannelClosed:
                 pass
@@ -262,6 +268,14 @@ class SubjectServer:
                 if line
             ]
         }
+
+
+def _next_request(channel: Channel, between: Callable[[], object] | None) -> dict[str, Any]:
+    while between is not None:
+        between()
+        with suppress(ChannelTimeout):
+            return channel.receive(BETWEEN_S)
+    return channel.receive()
 
 
 @contextmanager
