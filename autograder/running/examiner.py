@@ -6,8 +6,8 @@ from standard input, one JSON object a line, and writes for each part
 ``{"verdict": ..., "hangs": ...}`` to standard output; ``hangs`` says why the subject cannot be
 expected to go on, if so. ``KEY`` is the answer key of the part's hidden cell, ``pid`` the subject's
 process, ``seed`` what the exam's numbers are drawn from, ``last`` that nothing of the notebook runs
-after it, ``follows`` that a line ``{"progress": ...}`` with the results so far is wanted before
-each check.
+after it, ``follows`` that the subject is to be told of each check before it is made, with the
+results so far.
 File descriptor ``FD`` is the control channel to the subject's `SubjectServer`. In a sandbox it also
 has ``--outside FD``, its channel to a warden (`autograder.processes.outside`), and is alone with
 the subject on their network.
@@ -28,7 +28,13 @@ from typing import Any, TextIO
 
 from autograder import exercises
 from autograder.examination import points
-from autograder.examination.check_context import MAX_REPLY_BYTES, CheckContext, Subject
+from autograder.examination.check_context import (
+    MAX_REPLY_BYTES,
+    CheckContext,
+    StudentError,
+    Subject,
+    SubjectGone,
+)
 from autograder.examination.exam import Part
 from autograder.examination.plain_programs import Programs
 from autograder.examination.subject import hang_report
@@ -86,10 +92,11 @@ def serve_requests(
             answers.write(json.dumps(answer) + "\n")
             answers.flush()
 
-        def follow(progress: Progress) -> None:
-            write({"progress": progress.as_data()})
+        def show(progress: Progress) -> None:
+            with suppress(SubjectGone, StudentError):  # the checks find out for themselves
+                subject.show(progress)
 
-        told = [follow] if request["follows"] else []
+        told = [show] if request["follows"] else []
         for verdict in sit(request, session, subject, outside, programs, *told):
             write({"verdict": verdict.as_data(), "hangs": subject.hangs})
 

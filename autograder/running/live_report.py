@@ -1,8 +1,4 @@
-"""The report of a check while it runs: it grows in the cell with each result.
-
-Results come in a thread that waits for the examiner. What a cell shows is changed by the main
-thread alone: what another one displays may land in another cell.
-"""
+"""The report of a check while it runs: it grows in the cell with each result."""
 
 from __future__ import annotations
 
@@ -24,7 +20,6 @@ class LiveReport:
     def __init__(self, exam: str, part: str, hints: int) -> None:
         """Show that it begins; ``hints`` is how many hints of each failed check are given."""
         self._hints = hints
-        self._news: Progress | None = None
         self._last = Verdict(exam, part, ())
         self._handle: Any = None
         if _is_notebook():
@@ -32,16 +27,12 @@ class LiveReport:
 
             self._handle = display(self._report_on(STARTING), display_id=True)  # type: ignore[no-untyped-call]
 
-    def note(self, progress: Progress) -> None:
-        """Take in what is known by now; any thread may call it."""
-        self._news = progress
-
-    def refresh(self) -> None:
-        """Show what has been noted since the last time; only the main thread may call it."""
-        news, self._news = self._news, None
-        if news is not None:
-            self._last = news.so_far
-            self._update(self._report_on(f"Examining {news.number} of {news.of}: {news.title}"))
+    def show_progress(self, data: Any) -> None:
+        """Show the results so far, and what is examined now: a `Progress`, as JSON knows it."""
+        progress = Progress.from_data(data)
+        self._last = progress.so_far
+        now = f"Examining {progress.number} of {progress.of}: {progress.title}"
+        self._update(self._report_on(now))
 
     def finish(self, verdict: Verdict) -> None:
         """Show the whole verdict."""

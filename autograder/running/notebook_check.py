@@ -92,9 +92,9 @@ def examine_part(
         with ours, ExaminerProcess(theirs, lease.domain_id, course=course) as examiner:
             channel = Channel(ours)
             examiner.request(exam, [(part, key or {})], pid=os.getpid(), follows=True)
-            sitting = _Sitting(examiner, live)
+            sitting = _Sitting(examiner)
             try:
-                sitting.serve(SubjectServer(open_session, namespace), channel)
+                sitting.serve(SubjectServer(open_session, namespace, live.show_progress), channel)
             finally:
                 channel.close()
             return sitting.await_verdict()
@@ -109,8 +109,8 @@ class _Sitting:
     what constructors print lands in the cell, and a learner's own interrupt works as always.
     """
 
-    def __init__(self, examiner: ExaminerProcess, live: LiveReport) -> None:
-        self._examiner, self._live = examiner, live
+    def __init__(self, examiner: ExaminerProcess) -> None:
+        self._examiner = examiner
         self._verdict: Verdict | None = None
         self._error: CourseError | None = None
         self._served = threading.Event()
@@ -120,7 +120,7 @@ class _Sitting:
     def serve(self, server: SubjectServer, channel: Channel) -> None:
         self._waiter.start()
         try:
-            server.serve(channel, self._live.refresh)
+            server.serve(channel)
             with self._lock:
                 self._served.set()
         except KeyboardInterrupt:
@@ -136,7 +136,7 @@ class _Sitting:
 
     def _watch_examiner(self) -> None:
         try:
-            self._verdict = self._examiner.verdict(follow=self._live.note)
+            self._verdict = self._examiner.verdict()
         except CourseError as error:
             self._error = error
         if not self._served.wait(STUCK_AFTER_S):

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from autograder.examination import points
 from autograder.examination.draws import fresh_seed
 from autograder.examination.subject import hang_report
-from autograder.examination.verdict import Progress, Verdict, VerdictError
+from autograder.examination.verdict import Verdict, VerdictError
 from autograder.processes import python_module
 from autograder.processes.channel import parse_line
 from autograder.processes.descriptors import readable_descriptors
@@ -123,7 +123,7 @@ class ExaminerProcess:
             pid: the subject's process, for an examiner that looks at it itself.
             seed: what the exam's numbers are drawn from; one that nobody knows if left out.
             last: nothing of the notebook runs after it, so in a sandbox nothing is taken down.
-            follows: `verdict` is to be told of each check before it is made.
+            follows: the subject's server is told of each check before it is made.
         """
         self._asked = deque((exam, part) for part, _ in parts)
         self._send_message(
@@ -138,15 +138,11 @@ class ExaminerProcess:
         )
 
     def verdict(
-        self,
-        timeout: float = EXAM_TIMEOUT_S,
-        answer_with: Answering | None = None,
-        follow: Callable[[Progress], object] | None = None,
+        self, timeout: float = EXAM_TIMEOUT_S, answer_with: Answering | None = None
     ) -> Verdict:
         """Return the verdict of the next part that was asked for.
 
-        ``answer_with`` answers what the examiner asks for meanwhile (see `program_host`), and
-        ``follow`` is told how far it is, if the request said so.
+        ``answer_with`` answers what the examiner asks for meanwhile (see `program_host`).
 
         Raises:
             ExaminerError: the examiner ended, took longer than ``timeout`` seconds, asked for too
@@ -159,9 +155,6 @@ class ExaminerProcess:
                 answer = parse_line(line)
                 if not isinstance(answer, dict):
                     raise TypeError("it is no JSON object")
-                if follow is not None and "progress" in answer:
-                    follow(Progress.from_data(answer["progress"]))
-                    continue
                 if answer_with is None or "wants" not in answer:
                     return self._verdict_of(answer)
             except (ValueError, LookupError, TypeError, RecursionError, VerdictError) as error:

@@ -28,7 +28,7 @@ from autograder.examination.subject.student_errors import (
     student_trace,
 )
 from autograder.examination.subject.wall_waits import wall_waits
-from autograder.processes.channel import Channel, ChannelClosed, ChannelTimeout
+from autograder.processes.channel import Channel, ChannelClosed
 from course.runtime.context.context import default_context_beside
 from course.runtime.core_session import CoreSession
 from course.runtime.requests.service_ends import count_known_clients, count_known_servers
@@ -39,9 +39,6 @@ MAX_VALUE_CHARS = 64 * 1024
 
 MAX_NOTES = 500
 """Characters that are told of the error of a cell."""
-
-BETWEEN_S = 0.2
-"""Seconds between two calls of what is done between requests."""
 
 LAST_CALLBACKS_S = 0.5  # that callbacks of an exam's earlier session are given to end
 MOST_CLEANUPS = 100
@@ -54,8 +51,18 @@ OpenSession = Callable[[int, bool], CoreSession]
 class SubjectServer:
     """Carries out an examiner's requests on the nodes of one namespace."""
 
-    def __init__(self, open_session: OpenSession, namespace: Mapping[str, Any]) -> None:
-        """Serve what ``namespace`` (a notebook's globals) has, in sessions of ``open_session``."""
+    def __init__(
+        self,
+        open_session: OpenSession,
+        namespace: Mapping[str, Any],
+        show: Callable[[Any], object] = lambda _: None,
+    ) -> None:
+        """Serve what ``namespace`` (a notebook's globals) has, in sessions of ``open_session``.
+
+        ``show`` is given what an examiner tells of its progress, as JSON knows it: in the thread
+        that serves, because what another one displays may land in another cell.
+        """
+        self._show_progress = show
         self._open_session = open_session
         self._session: CoreSession | None = None
         self._beside = ExitStack()
@@ -67,14 +74,11 @@ class SubjectServer:
         self._raised: list[Exception | SystemExit] = []
         self._threads = ThreadErrors()
 
-    def serve(self, channel: Channel, between: Callable[[], object] | None = None) -> None:
-        """Answer requests until the examiner says that it is done or goes away.
-
-        ``between`` is called between two requests, and every `BETWEEN_S` while none comes.
-        """
+    def serve(self, channel: Channel) -> None:
+        """Answer requests until the examiner says that it is done or goes away."""
         with self._threads, _as_in_a_program():
             try:
-                while (request := _next_request(channel, between))["op"] != "done":
+                while (request := channel.receive())["op"] != "done":
                     channel.send(self._answer(request))
             except ChannelClosed:
                 pass
@@ -90,7 +94,7 @@ class SubjectServer:
                 "advance": self._advance, "nudge": self._nudge,
                 "call": self._call, "value": self._value,
                 "errors": self._errors, "sees": self._sees, "wall_waits": self._wall_waits,
-                "own_errors": self._own_errors,
+                "own_errors": self._own_errors, "show": self._show,
             }[request["op"]]  # fmt: skip
             return {"ok": True, **operation(request)}
         except _Missing as missing:
@@ -259,6 +263,10 @@ class SubjectServer:
             "of_threads": [str(error)[:500] for error in self._threads.items[-5:]],
         }
 
+    def _show(self, request: dict[str, Any]) -> dict[str, Any]:
+        self._show_progress(request["progress"])
+        return {}
+
     def _own_errors(self, request: dict[str, Any]) -> dict[str, Any]:
         found = [(error, own_line(error.exception)) for error in self._hosting_session.errors]
         return {
@@ -268,14 +276,6 @@ class SubjectServer:
                 if line
             ]
         }
-
-
-def _next_request(channel: Channel, between: Callable[[], object] | None) -> dict[str, Any]:
-    while between is not None:
-        between()
-        with suppress(ChannelTimeout):
-            return channel.receive(BETWEEN_S)
-    return channel.receive()
 
 
 @contextmanager
