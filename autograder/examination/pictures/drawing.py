@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from html import escape
 from itertools import pairwise
+from statistics import median
 from typing import NamedTuple
 
 from autograder.examination.pictures.picture import SPAN_KINDS, Lane, Picture, Series, Timeline
@@ -116,8 +117,8 @@ def _x_of(at: float, seconds: float) -> float:
 
 def _draw_lane(lane: Lane, y: float, height: float, seconds: float) -> str:
     places = [_x_of(at, seconds) for at, _ in lane.marks]
-    nearest = min((b - a for a, b in pairwise(places) if b > a), default=99.0)
-    radius = min(4.5, max(1.5, nearest * 0.42), height / 2 - 3)
+    gaps = [b - a for a, b in pairwise(places) if b > a] or [WIDTH]
+    radius = min(4.5, max(1.5, median(gaps) * 0.42), height / 2 - 3)
     parts = [_line(LEFT, y, RIGHT, y, opacity=0.25), _text(0, y + 4, lane.label)]
     for begin, end, kind in lane.spans:
         parts.append(_span(_x_of(begin, seconds), _x_of(end, seconds), y, height - 8, kind))

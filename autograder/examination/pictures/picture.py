@@ -105,7 +105,7 @@ class Timeline:
 
 @dataclass(frozen=True)
 class Series:
-    """A value over rounds, such as lives of a node: points (round, value).
+    """A value over rounds, such as lives of a node, or over seconds: points (round, value).
 
     Raises:
         ValueError: it is larger than a picture may be, or makes no sense.

@@ -67,11 +67,12 @@ def require_backlog(rig: SensorRig, sensor: Sensor) -> Backlog:
 def require_fresh(rig: SensorRig, sensor: Sensor, expected: str) -> None:
     """Fail unless the consumer goes on with the newest after a long pause, and keeps up then."""
     backlog = require_backlog(rig, sensor)
-    lag = rig.run_once(pause_for_long).lags[sensor]
-    fault = backlog.describe_fault(sensor.most, sensor.rate_hz, sensor.noun) or lag.lag
-    if fault:
+    pause = rig.run_once(pause_for_long)
+    lag = pause.lags[sensor]
+    in_pause = backlog.describe_fault(sensor.most, sensor.rate_hz, sensor.noun)
+    if fault := in_pause or lag.lag:
         actual = f"{fault.removesuffix('.')}{rig.error_note()}."
-        with with_picture(lambda: rig.run_once(pause_for_long).draw(sensor)):
+        with with_picture(lambda: pause.draw(sensor) if in_pause else lag.draw()):
             raise Failed(expected=expected, actual=actual)
     if lag.is_undecided:
         raise too_busy(

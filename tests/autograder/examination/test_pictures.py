@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import doctest
 import json
 import xml.etree.ElementTree as ElementTree
 from dataclasses import asdict, replace
+from types import ModuleType
 from typing import Any
 
 import pytest
 
+from autograder.examination.pictures import drawing, wording
+from autograder.examination.pictures import picture as picture_data
 from autograder.examination.pictures.drawing import HEIGHT, WIDTH, draw_picture
 from autograder.examination.pictures.picture import (
     MAX_BYTES,
@@ -39,6 +43,13 @@ TRIES = Timeline(
 THREADS = Series("Threads over lives", "lives", "threads", tuple((n, 12 + n) for n in range(21)))
 BOTH = [TRIES, THREADS]
 EVIL = "</title><script>x"
+
+
+@pytest.mark.parametrize("module", [drawing, picture_data, wording])
+def test_the_examples_run(module: ModuleType) -> None:
+    result = doctest.testmod(module)
+    assert result.attempted
+    assert not result.failed
 
 
 def failed(picture: Picture | None) -> CheckResult:
