@@ -121,7 +121,7 @@ class Drive:
             Lane.of("the goal", {"event": [seconds]}, [(0.0, seconds, "allowed")]),
         )
         legend = (
-            ("done", "a feedback message"), ("busy", "to drive"),
+            ("busy", "to drive"),
             ("allowed", "is executed"),
             ("event", "has ended" if self.sent.is_done else "is still executed"),
         )  # fmt: skip

@@ -122,7 +122,7 @@ class ExaminedGrip(Grip):
         )
         legend = (
             ("done", "the gripper is called"), ("wrong", "too early, or too often"),
-            ("busy", "1 s for its answer"), ("due", "a try is due"), ("event", "a word is said"),
+            ("busy", "1 s for its answer"),
         )  # fmt: skip
         data = str(self.close).lower()
         return Timeline(f"After grip/request {data}, by the node's clock", seconds, lanes, legend)

@@ -113,6 +113,7 @@ class ObservedGoal:
             return [at - begin_s for at in times_s if at is not None]
 
         accepted = since_begin(sent.answered_at_s) if sent.accepted else []
+        asked = since_begin(sent.cancel_asked_at_s)
         end_s = [*since_begin(sent.ended_at_s), seconds][0]
         lanes = (
             Lane.of(
@@ -120,11 +121,10 @@ class ObservedGoal:
                 [(at, end_s, "busy") for at in accepted],
             ),
             Lane.of("its feedback", {"done": since_begin(*sent.feedback_at_s[-MOST_DRAWN:])}),
-            Lane.of("a cancel is asked for", {"due": since_begin(sent.cancel_asked_at_s)}),
+            *(Lane.of("a cancel is asked for", {"due": [at]}) for at in asked),
         )  # fmt: skip
         legend = (
             ("busy", "accepted, and executed"), ("event", f"over: {sent.end}"[:MAX_LABEL_CHARS]),
-            ("done", "a message"),
         )  # fmt: skip
         title = f"{self.what} since it was sent, by the node's clock"[:MAX_TITLE_CHARS]
         return Timeline(title, seconds, lanes, legend)
