@@ -15,6 +15,7 @@ from autograder import exercises
 from autograder.assignments import submission
 from autograder.corpus import command, trials
 from autograder.corpus.case import Case, CorpusError, Splice, solution_cell
+from autograder.examination.pictures.wording import describe_picture
 from autograder.examination.verdict import CheckResult
 from autograder.running import runner
 from autograder.running.runner import Outcome
@@ -56,6 +57,8 @@ def _check_lines(check: CheckResult) -> Iterator[str]:
         yield f"        needed: {check.expected}"
     if check.actual:
         yield f"        seen:   {check.actual}"
+    if check.picture is not None:
+        yield f"        shown:  {describe_picture(check.picture)}"
 
 
 def try_exam(

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from autograder.examination.draws import USUAL_SEED, Draws
 from autograder.examination.plain_programs import Programs
+from autograder.examination.verdict import Progress
 from autograder.processes.channel import Channel, ChannelBroken, ChannelClosed, ChannelTimeout
 from autograder.processes.fair_deadline import FairDeadline, RunDelay, of_process
 from autograder.processes.outside.asking import Outside
@@ -291,6 +292,11 @@ class Subject:
                 for error in reply["errors"][:MAX_NOTES]
             }
         )
+
+    def show(self, progress: Progress) -> None:
+        """Have a notebook show how far its examination is."""
+        doing = "show how far its examination is"
+        self._ask_harness("show", "", progress=progress.as_data(), doing=doing)
 
     def _ask_harness(
         self,

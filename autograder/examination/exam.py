@@ -17,8 +17,9 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar, runtime_checkabl
 from autograder.examination import not_checked
 from autograder.examination import points as points_table
 from autograder.examination.check_context import CheckContext, StudentError, SubjectGone
+from autograder.examination.pictures.picture import Picture
 from autograder.examination.plain_programs import SlowProgramError
-from autograder.examination.verdict import CheckResult, Status, Verdict
+from autograder.examination.verdict import CheckResult, Progress, Status, Verdict
 from autograder.processes.fair_deadline import FairDeadline
 from autograder.util import exercise_folders
 from course.errors import CourseError
@@ -48,14 +49,16 @@ class ExamError(CourseError):
 class Failed(Exception):  # noqa: N818 - it is a finding, not a fault
     """The behaviour was observed and was not what is needed.
 
-    ``expected`` and ``actual`` are one sentence each, in the terms of the exercise.
+    ``expected`` and ``actual`` are one sentence each, in the terms of the exercise. ``picture``
+    shows what was seen over time: see `autograder.observe.findings.with_picture`.
     """
 
-    def __init__(self, *, expected: str, actual: str) -> None:
+    def __init__(self, *, expected: str, actual: str, picture: Picture | None = None) -> None:
         """Record what was needed and what was seen."""
         super().__init__(f"expected: {expected} observed: {actual}")
         self.expected = expected
         self.actual = actual
+        self.picture = picture
 
 
 class NotExaminable(Exception):  # noqa: N818 - a limit of this machine, not a fault
@@ -170,8 +173,15 @@ class Exam(Generic[RigT]):
                     f"The check '{name}' of exam '{self.name}' {says}: name it once in {file}."
                 )
 
-    def sit(self, parts: Iterable[Part], bench: CheckContext) -> Iterator[Verdict]:
+    def sit(
+        self,
+        parts: Iterable[Part],
+        bench: CheckContext,
+        follow: Callable[[Progress], object] = lambda _: None,
+    ) -> Iterator[Verdict]:
         """Run the checks of each part, and what they need, each once; yield a verdict a part.
+
+        ``follow`` is told of each check before it is made, with the results so far.
 
         All parts are one examination of the same running nodes, but for ``fresh_parts``. A check
         that is needed in another part earns nothing there: its points are in its own. One that the
@@ -197,13 +207,14 @@ class Exam(Generic[RigT]):
                         rig = None
                 table = self.part(part.name)
                 bench.key = part.key
-                results = [
-                    self._examine_check(name, rig, bench, done, gone, deadline) for name in table
-                ]
                 told.update(table)
-                results = [self._with_reason(result, done, told) for result in results]
-                checks = tuple(_with_points(result, table[result.name]) for result in results)
-                yield Verdict(self.name, part.name, checks)
+                so_far = Verdict(self.name, part.name, ())
+                for number, name in enumerate(table, 1):
+                    follow(Progress(so_far, self.checks[name].title, number, len(table)))
+                    result = self._examine_check(name, rig, bench, done, gone, deadline)
+                    result = _with_points(self._with_reason(result, done, told), table[name])
+                    so_far = replace(so_far, checks=(*so_far.checks, result))
+                yield so_far
             if bench.ends:
                 self._left_up = stack.pop_all()
 
@@ -282,7 +293,9 @@ def _run_check(check: Check[RigT], rig: Any, gone: list[CheckResult]) -> CheckRe
         with rig.for_check() if isinstance(rig, FreshForEachCheck) else nullcontext(rig) as given:
             note = check.run(given) or ""
     except Failed as failed:
-        result = _failed_result(check, failed.expected, failed.actual)
+        result = replace(
+            _failed_result(check, failed.expected, failed.actual), picture=failed.picture
+        )
         if isinstance(failed.__cause__, SubjectGone):
             gone.append(result)
         return result

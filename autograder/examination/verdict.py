@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, get_args
 
+from autograder.examination.pictures.picture import Picture, picture_from_data
 from course.errors import CourseError
 
 VERSION = 1
@@ -35,6 +36,7 @@ class CheckResult:
     on a robot, ``expected`` and ``actual`` what was needed and what was observed, ``hints`` lead to
     the mend step by step, ``read`` names where to read more, ``note`` is a remark on a pass.
     ``steps`` are what the examiner did and saw: for the author of the exam, not for students.
+    ``picture`` shows a sequence in time or over rounds that was wrong.
     """
 
     name: str
@@ -49,6 +51,7 @@ class CheckResult:
     read: str = ""
     note: str = ""
     steps: tuple[str, ...] = ()
+    picture: Picture | None = None
 
     @property
     def passed(self) -> bool:
@@ -152,6 +155,33 @@ class Verdict:
             ) from error
 
 
+@dataclass(frozen=True)
+class Progress:
+    """How far the examination of a part is: the results so far, and the check that is made now.
+
+    ``title`` is that check's; it is ``number`` in the part, of so many.
+    """
+
+    so_far: Verdict
+    title: str
+    number: int
+    of: int
+
+    def as_data(self) -> dict[str, Any]:
+        """Return it as JSON knows it."""
+        return asdict(self)
+
+    @classmethod
+    def from_data(cls, data: Any) -> Progress:
+        """Read what `as_data` returned, after a way through JSON.
+
+        Raises:
+            ValueError, KeyError, TypeError, VerdictError: it is something else.
+        """
+        so_far = Verdict.from_data(data["so_far"])
+        return cls(so_far, str(data["title"])[:MAX_TEXT], int(data["number"]), int(data["of"]))
+
+
 def _check_from_data(item: dict[str, Any]) -> CheckResult:
     if item["status"] not in STATUSES:
         raise ValueError(f"unknown status {item['status']!r}")
@@ -160,8 +190,11 @@ def _check_from_data(item: dict[str, Any]) -> CheckResult:
         raise ValueError(f"{points} points of {max_points}")
     hints, steps = tuple(item["hints"]), tuple(item.get("steps", ()))
     result = CheckResult(
-        **{**item, "points": points, "max_points": max_points, "hints": hints, "steps": steps}
-    )
+        **{
+            **item, "points": points, "max_points": max_points, "hints": hints, "steps": steps,
+            "picture": picture_from_data(item.get("picture")),  # older verdicts have none
+        }
+    )  # fmt: skip
     if not all(isinstance(text, str) for text in result.all_texts()):
         raise TypeError("something else where a text belongs")
     return result

@@ -9,13 +9,14 @@ from collections.abc import Iterator
 from typing import Any
 
 from autograder import observe
+from autograder.examination.pictures.picture import Lane, Series, Timeline
 from autograder.observe.choices import Choices, Question
 from autograder.observe.examiner.actions import ActionServerEnd, SentGoal
 from autograder.observe.examiner.lossless_listener import LosslessListener
 from autograder.observe.examiner.merged_subscriptions import MergedSubscription
 from autograder.observe.examiner.radio_link import open_radio_link
 from autograder.observe.examiner.services import Request, ServiceServer
-from autograder.observe.findings import in_context
+from autograder.observe.findings import handled_picture, in_context, rate_picture, with_picture
 from autograder.observe.graph.graph_reader import GraphReader
 from autograder.observe.graph.link_faults import find_link_faults
 from autograder.observe.graph.node_graph import NodeGraph
@@ -71,7 +72,10 @@ DESCRIBED: dict[str, tuple[Any, ...]] = {
         SteppedObserver, SteppedGoal, MergedSubscription, require_stream, StreamRate,
         SteppedTrials,
     ),
-    "What a student chose, and findings": (Choices, Question, in_context),
+    "What a student chose, and findings": (
+        Choices, Question, in_context, with_picture, rate_picture, handled_picture, Timeline, Lane,
+        Series,
+    ),
 }  # fmt: skip
 
 

@@ -7,10 +7,12 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, NoReturn
 
 from autograder.examination.exam import Failed
+from autograder.examination.pictures.picture import Timeline
 from autograder.observe.examiner.examiner_end import Heard
+from autograder.observe.findings import rate_picture, with_picture
 from autograder.observe.nouns import Topic
 from autograder.observe.phrases import capitalize_first
 
@@ -147,6 +149,10 @@ class Span:
             rate = span._rate(topic, hz, leeway)
         if rate.is_right:
             return
+        with with_picture(lambda: span._rate_picture(topic, hz)):
+            span._refuse_rate(topic, rate, hz)
+
+    def _refuse_rate(self, topic: Topic, rate: Rate, hz: float) -> NoReturn:
         each = "a second" if hz >= 1 else f"every {1 / hz:g} s"
         number = f"{hz:g} messages" if hz > 1 else "a message"
         expected = self._sentence(f"{number} {each} {'come' if hz > 1 else 'comes'} on {topic}.")
@@ -158,10 +164,14 @@ class Span:
             )
         raise Failed(
             expected=expected,
-            actual=f"In {span.seconds:g} s of the node's time {_came(rate.came)}."
+            actual=f"In {self.seconds:g} s of the node's time {_came(rate.came)}."
             + self._note()
             + self._clock_hint(topic, rate),
         )
+
+    def _rate_picture(self, topic: Topic, hz: float) -> Timeline:
+        times_s = [heard.at_s - self.begin_s for heard in self.heard(topic)]
+        return rate_picture(f"Messages on {topic}, by the node's clock", times_s, hz, self.seconds)
 
     def require_silence(self, topic: Topic) -> None:
         """Require that nothing comes on a topic.

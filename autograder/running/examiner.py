@@ -1,11 +1,13 @@
 """The examiner process: sits exams on a subject that it can only see over DDS.
 
 Started as ``python -P -m autograder.running.examiner --control FD --domain N``. It reads requests
-``{"exam": ..., "parts": [[NAME, KEY], ...], "pid": ..., "seed": ..., "last": ...}`` from standard
-input, one JSON object a line, and writes for each part ``{"verdict": ..., "hangs": ...}`` to
-standard output; ``hangs`` says why the subject cannot be expected to go on, if so. ``KEY`` is the
-answer key of the part's hidden cell, ``pid`` the subject's process, ``seed`` what the exam's
-numbers are drawn from, ``last`` that nothing of the notebook runs after it.
+``{"exam": ..., "parts": [[NAME, KEY], ...], "pid": ..., "seed": ..., "last": ..., "follows": ...}``
+from standard input, one JSON object a line, and writes for each part
+``{"verdict": ..., "hangs": ...}`` to standard output; ``hangs`` says why the subject cannot be
+expected to go on, if so. ``KEY`` is the answer key of the part's hidden cell, ``pid`` the subject's
+process, ``seed`` what the exam's numbers are drawn from, ``last`` that nothing of the notebook runs
+after it, ``follows`` that the subject is to be told of each check before it is made, with the
+results so far.
 File descriptor ``FD`` is the control channel to the subject's `SubjectServer`. In a sandbox it also
 has ``--outside FD``, its channel to a warden (`autograder.processes.outside`), and is alone with
 the subject on their network.
@@ -18,7 +20,7 @@ import json
 import os
 import socket
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -26,11 +28,17 @@ from typing import Any, TextIO
 
 from autograder import exercises
 from autograder.examination import points
-from autograder.examination.check_context import MAX_REPLY_BYTES, CheckContext, Subject
+from autograder.examination.check_context import (
+    MAX_REPLY_BYTES,
+    CheckContext,
+    StudentError,
+    Subject,
+    SubjectGone,
+)
 from autograder.examination.exam import Part
 from autograder.examination.plain_programs import Programs
 from autograder.examination.subject import hang_report
-from autograder.examination.verdict import Verdict
+from autograder.examination.verdict import Progress, Verdict
 from autograder.processes.channel import Channel
 from autograder.processes.outside.asking import Afar, Here, Outside
 from autograder.util import exercise_folders
@@ -44,8 +52,11 @@ def sit(
     subject: Subject,
     outside: Outside,
     programs: Programs | None = None,
+    follow: Callable[[Progress], object] = lambda _: None,
 ) -> Iterator[Verdict]:
     """Run parts of an exam, yield a verdict a part, and let the subject go on.
+
+    ``follow`` is told of each check before it is made.
 
     In a sandbox in which nothing goes on, nodes on either side are not taken down one by one, which
     takes as long as some checks: they end with the sandbox.
@@ -55,7 +66,8 @@ def sit(
     try:
         bench = CheckContext(session, subject, outside, int(request["seed"]), programs, ends)
         exam = exercises.load_exam(request["exam"])
-        for verdict in exam.sit([Part(name, key) for name, key in request["parts"]], bench):
+        parts = [Part(name, key) for name, key in request["parts"]]
+        for verdict in exam.sit(parts, bench, follow):
             yield replace(verdict, seed=bench.draws.seed)
     finally:
         if not ends:
@@ -75,10 +87,18 @@ def serve_requests(
         outside = outside or Here(int(request["pid"]))
         # In a student's own notebook there is only the kernel's process.
         programs = Programs(requests, answers, outside) if outside.own_network else None
-        for verdict in sit(request, session, subject, outside, programs):
-            answer = {"verdict": verdict.as_data(), "hangs": subject.hangs}
+
+        def write(answer: dict[str, Any]) -> None:
             answers.write(json.dumps(answer) + "\n")
             answers.flush()
+
+        def show(progress: Progress) -> None:
+            with suppress(SubjectGone, StudentError):  # the checks find out for themselves
+                subject.show(progress)
+
+        told = [show] if request["follows"] else []
+        for verdict in sit(request, session, subject, outside, programs, *told):
+            write({"verdict": verdict.as_data(), "hangs": subject.hangs})
 
 
 def preload() -> None:

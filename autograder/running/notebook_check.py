@@ -16,8 +16,8 @@ from autograder import exercises
 from autograder.examination.subject.server import SubjectServer
 from autograder.examination.subject.student_errors import SUBJECT_ENV
 from autograder.examination.verdict import Verdict
-from autograder.examination.verdict_text import Report
 from autograder.processes.channel import Channel
+from autograder.running.live_report import LiveReport
 from autograder.running.start import ExaminerProcess
 from autograder.util import exercise_folders
 from course.errors import CourseError
@@ -58,15 +58,23 @@ def check(
             Path.cwd()
         )  # it may have changed, or be another folder's by now
     exercises.load_exam(exam).part(part)
-    verdict = examine_part(exam, part, namespace, key)
-    _show_report(Report(_note_checks(verdict), hints=hint))
+    live = LiveReport(exam, part, hint)
+    try:
+        verdict = examine_part(exam, part, namespace, key, live)
+    except BaseException:
+        live.stop()
+        raise
+    live.finish(_note_checks(verdict))
     return float(verdict.score + verdict.unexamined_points)
 
 
 def examine_part(
-    exam: str, part: str, namespace: Mapping[str, Any], key: Mapping[str, Any] | None = None
-) -> Verdict:
+    exam: str, part: str, namespace: Mapping[str, Any], key: Mapping[str, Any] | None,
+    live: LiveReport,
+) -> Verdict:  # fmt: skip
     """Sit one part of an exam on the classes of ``namespace``, in sessions made for it.
+
+    ``live`` shows each result as soon as it is known.
 
     Call it from the main thread: what hangs in the student's code is interrupted there.
 
@@ -83,10 +91,10 @@ def examine_part(
         course = exercise_folders.current_exercises().root
         with ours, ExaminerProcess(theirs, lease.domain_id, course=course) as examiner:
             channel = Channel(ours)
-            examiner.request(exam, [(part, key or {})], pid=os.getpid())
+            examiner.request(exam, [(part, key or {})], pid=os.getpid(), follows=True)
             sitting = _Sitting(examiner)
             try:
-                sitting.serve(SubjectServer(open_session, namespace), channel)
+                sitting.serve(SubjectServer(open_session, namespace, live.show_progress), channel)
             finally:
                 channel.close()
             return sitting.await_verdict()
@@ -164,18 +172,3 @@ def _caller_globals() -> Mapping[str, Any]:
     assert frame.f_back is not None
     assert frame.f_back.f_back is not None
     return frame.f_back.f_back.f_globals
-
-
-def _show_report(report: Report) -> None:
-    try:
-        from IPython.core.getipython import get_ipython
-    except ImportError:
-        shell = None
-    else:
-        shell = get_ipython()
-    if shell is None:
-        print(report)  # noqa: T201 - outside a notebook, the terminal is where a report goes
-    else:
-        from IPython.display import display
-
-        display(report)  # type: ignore[no-untyped-call]

@@ -113,6 +113,7 @@ class ExaminerProcess:
         pid: int,
         seed: int | None = None,
         last: bool = False,
+        follows: bool = False,
     ) -> None:
         """Ask for parts of an exam; their verdicts come one by one with `verdict`.
 
@@ -122,6 +123,7 @@ class ExaminerProcess:
             pid: the subject's process, for an examiner that looks at it itself.
             seed: what the exam's numbers are drawn from; one that nobody knows if left out.
             last: nothing of the notebook runs after it, so in a sandbox nothing is taken down.
+            follows: the subject's server is told of each check before it is made.
         """
         self._asked = deque((exam, part) for part, _ in parts)
         self._send_message(
@@ -131,6 +133,7 @@ class ExaminerProcess:
                 "pid": pid,
                 "seed": fresh_seed() if seed is None else seed,
                 "last": last,
+                "follows": follows,
             }
         )
 

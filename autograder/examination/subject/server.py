@@ -51,8 +51,18 @@ OpenSession = Callable[[int, bool], CoreSession]
 class SubjectServer:
     """Carries out an examiner's requests on the nodes of one namespace."""
 
-    def __init__(self, open_session: OpenSession, namespace: Mapping[str, Any]) -> None:
-        """Serve what ``namespace`` (a notebook's globals) has, in sessions of ``open_session``."""
+    def __init__(
+        self,
+        open_session: OpenSession,
+        namespace: Mapping[str, Any],
+        show: Callable[[Any], object] = lambda _: None,
+    ) -> None:
+        """Serve what ``namespace`` (a notebook's globals) has, in sessions of ``open_session``.
+
+        ``show`` is given what an examiner tells of its progress, as JSON knows it: in the thread
+        that serves, because what another one displays may land in another cell.
+        """
+        self._show_progress = show
         self._open_session = open_session
         self._session: CoreSession | None = None
         self._beside = ExitStack()
@@ -84,7 +94,7 @@ class SubjectServer:
                 "advance": self._advance, "nudge": self._nudge,
                 "call": self._call, "value": self._value,
                 "errors": self._errors, "sees": self._sees, "wall_waits": self._wall_waits,
-                "own_errors": self._own_errors,
+                "own_errors": self._own_errors, "show": self._show,
             }[request["op"]]  # fmt: skip
             return {"ok": True, **operation(request)}
         except _Missing as missing:
@@ -252,6 +262,10 @@ class SubjectServer:
             ],
             "of_threads": [str(error)[:500] for error in self._threads.items[-5:]],
         }
+
+    def _show(self, request: dict[str, Any]) -> dict[str, Any]:
+        self._show_progress(request["progress"])
+        return {}
 
     def _own_errors(self, request: dict[str, Any]) -> dict[str, Any]:
         found = [(error, own_line(error.exception)) for error in self._hosting_session.errors]

@@ -6,9 +6,11 @@ from contextlib import suppress
 
 from autograder.examination.check_context import SubjectGone
 from autograder.examination.exam import Failed, NotExaminable
+from autograder.examination.pictures.picture import Lane, Timeline
 from autograder.exercises.patterns.robot import POSITION, Robot
 from autograder.exercises.patterns.scenarios import SCENARIOS
 from autograder.observe import Action
+from autograder.observe.findings import add_picture
 from autograder.observe.marks.marked_types import load_type
 from autograder.observe.stepped_time.stepped_goal import SteppedGoal
 
@@ -23,6 +25,8 @@ MAX_HALTS = 3
 """Times that a robot may be found halting where it had been driving a moment before."""
 RAMP_S = 30.0
 """Seconds of the node's clock that a robot may take to come to its speed."""
+MOST_DRAWN, SHORTEST_DRAWN_S = 40, 0.1
+"""Feedback messages, and stretches of driving, in a picture; and seconds that it shows at least."""
 CLEARING_S = 2.0
 """Seconds of wall time that a goal gets to end after its check has failed."""
 
@@ -42,7 +46,8 @@ class Drive:
         """Send the robot from where it is to station ``goal``."""
         self.robot, self.goal = robot, goal
         self.start = self.station = int(robot.position)
-        self._since_s = robot.elapsed_s
+        self._since_s = self._began_s = robot.elapsed_s
+        self._reached_s: list[float] = []
         robot.speeds.clear()
         action_type = load_type(robot.found.offers["navigation"]["action"])
         self.sent = SteppedGoal(
@@ -57,8 +62,10 @@ class Drive:
         """Return the drive, which the end of the block brings to an end if it goes on."""
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
         """Leave nothing behind that the next drive would stumble over."""
+        if isinstance(error, Failed):
+            add_picture(error, self.draw)
         with suppress(Failed, NotExaminable, SubjectGone):
             if not self.sent.is_done:
                 self.move_to(self.goal + BEYOND_M)
@@ -80,6 +87,7 @@ class Drive:
         self.leave_station()
         self.station += 1
         self.move_to(self.station + BEYOND_M)
+        self._reached_s.append(self.robot.elapsed_s)
 
     def leave_station(self) -> None:
         """Let the robot drive most of the way to the next station, if it has not yet."""
@@ -89,6 +97,36 @@ class Drive:
         """Have the hardware report a ``position`` (m)."""
         self._since_s = self.robot.elapsed_s
         self.robot.report(POSITION, position)
+
+    def draw(self) -> Timeline:
+        """Return a picture of the drive so far: its stations and feedback, and when it moved."""
+        begin_s, now_s = self._began_s, self.robot.elapsed_s
+        seconds = max(now_s - begin_s, SHORTEST_DRAWN_S)
+        turns = [
+            (self.robot.clock_at(told.published_ns)[1] - begin_s, told.value != 0)
+            for told in self.robot.speeds.publications
+        ]
+        changes = [turn for at, turn in enumerate(turns) if not at or turn[1] != turns[at - 1][1]]
+        ends = [at for at, _ in changes[1:]] + [seconds]
+        drives = [
+            (max(at, 0.0), end, "busy")
+            for (at, moves), end in zip(changes, ends, strict=True) if moves
+        ][-MOST_DRAWN:]  # fmt: skip
+        reports = [at - begin_s for at in self.sent.feedback_at_s][-MOST_DRAWN:]
+        reached = [at - begin_s for at in self._reached_s]
+        lanes = (
+            Lane.of("the robot reaches a station", {"due": reached}),
+            Lane.of("feedback of the goal", {"done": reports}),
+            Lane.of("the motors are told", {}, drives),
+            Lane.of("the goal", {"event": [seconds]}, [(0.0, seconds, "allowed")]),
+        )
+        legend = (
+            ("busy", "to drive"),
+            ("allowed", "is executed"),
+            ("event", "has ended" if self.sent.is_done else "is still executed"),
+        )  # fmt: skip
+        title = f"The drive from station {self.start} to {self.goal}, by the node's clock"
+        return Timeline(title, seconds, lanes, legend)
 
     # The motors.
 

@@ -7,15 +7,17 @@ one what must not be lost, in so little time that nothing of it is old.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from autograder.examination.exam import Failed
+from autograder.examination.pictures.picture import Timeline
 from autograder.exercises.qos.readings import CAMERA, CONSUMERS, IMU, LIDAR, STOP, Sensor, SensorRig
 from autograder.exercises.qos.single_readings import (
     find_prompt,
     require_each_published,
     send_singles,
 )
+from autograder.observe.findings import handled_picture, with_picture
 from autograder.observe.relays.sequence_faults import lost_phrase, numbers_phrase
 from autograder.observe.relays.slow_reader import (
     PROMPT_S,
@@ -37,6 +39,8 @@ LONG_PAUSE = {
 }
 BURST = 5
 """IMU readings that come in while the consumer is busy for 50 ms."""
+BURST_S = 0.05
+"""Seconds in which they come in, at least."""
 YOUNG_S = 0.35
 """Seconds from the first reading of a burst on in which all come out of an idle machine: a design
 that goes by the age of a reading (0.5 s is old) may rightly find a later one too old, and then it
@@ -63,11 +67,13 @@ def require_backlog(rig: SensorRig, sensor: Sensor) -> Backlog:
 def require_fresh(rig: SensorRig, sensor: Sensor, expected: str) -> None:
     """Fail unless the consumer goes on with the newest after a long pause, and keeps up then."""
     backlog = require_backlog(rig, sensor)
-    lag = rig.run_once(pause_for_long).lags[sensor]
-    fault = backlog.describe_fault(sensor.most, sensor.rate_hz, sensor.noun) or lag.lag
-    if fault:
+    pause = rig.run_once(pause_for_long)
+    lag = pause.lags[sensor]
+    in_pause = backlog.describe_fault(sensor.most, sensor.rate_hz, sensor.noun)
+    if fault := in_pause or lag.lag:
         actual = f"{fault.removesuffix('.')}{rig.error_note()}."
-        raise Failed(expected=expected, actual=actual)
+        with with_picture(lambda: pause.draw(sensor) if in_pause else lag.draw()):
+            raise Failed(expected=expected, actual=actual)
     if lag.is_undecided:
         raise too_busy(
             f"bring {sensor} readings at {sensor.rate_hz:.0f} Hz, and so to see whether your "
@@ -94,6 +100,15 @@ class Burst:
     kept: list[int]
     published: int
     is_aged: bool
+    times_s: dict[int, float] = field(default_factory=dict)
+    """When each came in, since the first."""
+
+    def draw(self) -> Timeline:
+        """Return a picture of the readings that came in, and of which were passed on."""
+        title = "What came in while the consumer was busy for a moment, and what it passed on"
+        ended_s = max(BURST_S, *self.times_s.values())
+        label = "IMU readings that came in"
+        return handled_picture(title, label, self.kept, self.times_s, (0.0, ended_s), "passed on")
 
     @property
     def missing_count(self) -> int:
@@ -130,7 +145,9 @@ def _send_burst(rig: SensorRig, series: str, patience_s: float | None) -> Burst:
     rig.wait(lambda: len(set(path.handed.numbers(series))) == BURST, PROMPT_S)
     rig.wait_for_rest()  # one that hands on a reading again is heard out: how many is told
     is_aged = decided_ns - published.get(0, 0) > YOUNG_S * 1e9
-    return Burst(path.handed.numbers(series), len(published), is_aged or is_jammed)
+    times_s = {number: (when - min(published.values())) / 1e9 for number, when in published.items()}
+    kept = path.handed.numbers(series)
+    return Burst(kept, len(published), is_aged or is_jammed, times_s)
 
 
 def _decision_ns(rig: SensorRig, series: str) -> int:
@@ -177,4 +194,5 @@ def require_burst(rig: SensorRig, expected: str) -> None:
         actual = f"It passed them on out of order: {numbers_phrase(found.kept, 'reading')}."
     else:
         return
-    raise Failed(expected=expected, actual=actual)
+    with with_picture(found.draw):
+        raise Failed(expected=expected, actual=actual)

@@ -73,11 +73,14 @@ def require_flat_starts(rig: CameraRig, kind: str, *, memory: bool = False) -> N
     def attempt_starts() -> None:
         for _ in range(STARTS):
             attempt_start(rig, new_device(kind))
+            along.append(rig.process.read_usage())
 
     before = rig.process.read_usage()
+    along = [before]
     attempt_starts()
     expected = "A driver that cannot start leaves nothing behind: no thread, no file, and less than"
     require_flat(
         rig, before, STARTS, what="such starts", expected=f"{expected} 1 MiB of memory each.",
         kib_each=START_KIB if memory else 0, again=attempt_starts if memory else None,
+        along=along,
     )  # fmt: skip

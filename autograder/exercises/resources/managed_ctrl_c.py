@@ -94,6 +94,7 @@ class ManagedWatch(CameraProgram):
             raise Failed(
                 expected=f"{ALONE} it goes through its states as well: {failed.expected}",
                 actual=failed.actual,
+                picture=failed.picture,
             ) from None
         return name, hz
 

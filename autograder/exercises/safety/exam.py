@@ -144,7 +144,9 @@ def gripper_retries(nodes: Nodes) -> None:
         try:
             gripper_client.give_up(node, gripper, not close)
         except Failed as failed:
-            raise Failed(expected=failed.expected, actual=failed.actual + IN_A_ROW) from None
+            raise Failed(
+                expected=failed.expected, actual=failed.actual + IN_A_ROW, picture=failed.picture
+            ) from None
         gripper_client.carry_out(node, gripper, True, 0.0)
         node.advance(APART_S)
         gripper_client.carry_out(node, gripper, False, SLOW_S, aside=GRIP_LEFT)

@@ -7,8 +7,10 @@ from functools import partial
 from std_msgs.msg import Bool, Empty, String
 from std_srvs.srv import SetBool
 
+from autograder.examination.pictures.picture import Lane, Timeline
 from autograder.observe import Service, Task, Topic
 from autograder.observe.examiner.services import Request, ServiceServer
+from autograder.observe.findings import with_picture
 from autograder.observe.observed_node import STRIDE_S
 from autograder.observe.phrases import capitalize_first, say_words, there_were
 from autograder.observe.several_nodes.clock_bound_node import ClockBoundNode
@@ -37,6 +39,7 @@ PAUSE_S = 0.5  # from then to the second try, at least, and by which the next pa
 SHORTEST_S = 4.5 - 5 * ALLOWED_S - STRIDE_S  # three tries and two pauses, as short as may be
 HELD_S = 1.0  # of wall time for which the node's clock stands still in the first pause
 BEAT_S = 0.5  # between two heartbeats
+MOST_DRAWN = 30  # tries, and outcomes, in a picture
 GIVEN_UP = "After three tries without an answer"
 require_beats = partial(require_heartbeat, topic=HEARTBEAT, period_s=BEAT_S, allowed_s=ALLOWED_S)
 SECOND_TRY = "After a try without an answer there is a second one."
@@ -98,6 +101,31 @@ class ExaminedGrip(Grip):
                 f"Within {PROMPT_S:g} s the gripper was not called. {say_words(self.outcomes)}",
             )
             self.require_data()
+
+    def draw(self) -> Timeline:
+        """Return a picture of the tries so far, of when they were due, and of the outcomes."""
+        tries_s = [attempt.at_s - self.began_s for attempt in self.tries[:MOST_DRAWN]]
+        outcomes = [h for h in self._end.heard(OUTCOME) if h.at_s >= self.began_s][:MOST_DRAWN]
+        seconds = max(self._node.now_s - self.began_s, ANSWER_S)
+        due_s = [tries_s[0], tries_s[0] + ANSWER_S + PAUSE_S] if tries_s else []
+        if len(tries_s) > 1:
+            due_s.append(2 * tries_s[1] - tries_s[0] + PAUSE_S)
+        waits = [(at, min(at + ANSWER_S, seconds), "busy") for at in tries_s]
+        wrong = {
+            at for number, at in enumerate(tries_s)
+            if number >= len(due_s) or at < due_s[number] - TOLERANCE_S
+        }  # fmt: skip
+        lanes = (
+            Lane.of("tries", {"done": {*tries_s} - wrong, "wrong": wrong}, waits),
+            Lane.of("due then, or a bit later", {"due": [at for at in due_s if at <= seconds]}),
+            Lane.of("outcome", {"event": [heard.at_s - self.began_s for heard in outcomes]}),
+        )
+        legend = (
+            ("done", "the gripper is called"), ("wrong", "too early, or too often"),
+            ("busy", "1 s for its answer"),
+        )  # fmt: skip
+        data = str(self.close).lower()
+        return Timeline(f"After grip/request {data}, by the node's clock", seconds, lanes, legend)
 
     def require_data(self) -> None:
         """Require that every try so far asks for what was requested."""
@@ -194,16 +222,17 @@ def carry_out(
     ``aside`` is a sentence to add if the gripper was called again.
     """
     grip = ExaminedGrip(node, gripper, close)
-    node.advance_until(lambda: False, delay_s)
-    if not grip.outcomes:
-        grip.tries[0].answer(success=True)
-    node.advance_until(grip.has_gone_on, PROMPT_S)
-    node.require_that(
-        len(grip.tries) == 1,
-        f"An answer after {delay_s:g} s is in time: one try is enough.",
-        f"The gripper was called {len(grip.tries)} times.{aside}",
-    )
-    grip.require_outcome(f"When the gripper answered success=True after {delay_s:g} s", "done")
+    with with_picture(grip.draw):
+        node.advance_until(lambda: False, delay_s)
+        if not grip.outcomes:
+            grip.tries[0].answer(success=True)
+        node.advance_until(grip.has_gone_on, PROMPT_S)
+        node.require_that(
+            len(grip.tries) == 1,
+            f"An answer after {delay_s:g} s is in time: one try is enough.",
+            f"The gripper was called {len(grip.tries)} times.{aside}",
+        )
+        grip.require_outcome(f"When the gripper answered success=True after {delay_s:g} s", "done")
     return grip
 
 
@@ -233,7 +262,8 @@ def give_up(
     if not grip.outcomes:
         node.forget(HOLD)  # what came with a try says nothing about the outcome
     node.advance_until(grip.is_over, grip.began_s + DEADLINE_S - node.now_s)
-    _require_three_tries(node, grip)
+    with with_picture(grip.draw):
+        _require_three_tries(node, grip)
     return grip
 
 

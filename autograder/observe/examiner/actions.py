@@ -37,6 +37,7 @@ class SentGoal:
 
     Attributes:
         sent_at_s: when it was sent, in s of the node's time.
+        answered_at_s, cancel_asked_at_s, ended_at_s: when that was, once it has been.
         accepted: whether the server accepted it; None without an answer.
         feedback: the messages of the action's feedback that came.
         feedback_at_s: when each came, in s of the node's time.
@@ -45,9 +46,13 @@ class SentGoal:
         result: the action's result, or None.
     """
 
-    def __init__(self, sent_at_s: float) -> None:
-        """Nothing has come of it yet."""
-        self.sent_at_s = sent_at_s
+    def __init__(self, now_s: Callable[[], float]) -> None:
+        """Nothing has come of it yet; ``now_s`` tells the node's time."""
+        self._now_s = now_s
+        self.sent_at_s = now_s()
+        self.answered_at_s: float | None = None
+        self.cancel_asked_at_s: float | None = None
+        self.ended_at_s: float | None = None
         self.accepted: bool | None = None
         self.feedback: list[Any] = []
         self.feedback_at_s: list[float] = []
@@ -59,12 +64,13 @@ class SentGoal:
     def note_answer(self, future: Future) -> None:
         """Note the answer to the goal, and ask for its result if it was accepted."""
         self._handle = future.result()
-        self.accepted = bool(self._handle.accepted)
+        self.accepted, self.answered_at_s = bool(self._handle.accepted), self._now_s()
         if self.accepted:
             self._handle.get_result_async().add_done_callback(self._note_end)
 
     def _note_end(self, future: Future) -> None:
         self.result = future.result().result
+        self.ended_at_s = self._now_s()
         self.end = ENDS.get(future.result().status, "unknown")
 
     def request_cancel(self) -> Future:
@@ -75,6 +81,7 @@ class SentGoal:
         """
         if self._handle is None:
             raise RuntimeError("a goal that was not accepted cannot be canceled")
+        self.cancel_asked_at_s = self._now_s()
         answer: Future = self._handle.cancel_goal_async()
         return answer
 
@@ -97,7 +104,7 @@ class ActionClientEnd:
 
     def send(self, **fields: Any) -> SentGoal:
         """Send a goal with these fields; what comes of it is noted as it comes."""
-        goal = SentGoal(self._now_s())
+        goal = SentGoal(self._now_s)
 
         def note_feedback(message: Any) -> None:
             goal.feedback.append(message.feedback)

@@ -7,9 +7,11 @@ threads of its own. What grows with each of many rounds is a leak.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from autograder.examination.exam import Failed
+from autograder.observe.findings import with_picture
+from autograder.observe.lifecycle.growth_picture import growth_picture
 from autograder.observe.lifecycle.node_lives import NodeLives
 from autograder.observe.lifecycle.observer import ENDED_S
 from autograder.observe.lifecycle.process_holdings import Usage, list_growth
@@ -39,6 +41,7 @@ def require_flat(
     kib_each: int = 0,
     again: Callable[[], object] | None = None,
     repeats: int = 1,
+    along: Sequence[Usage] = (),
 ) -> None:
     """Require that rounds which are over have left no threads and no files behind, nor memory.
 
@@ -51,6 +54,8 @@ def require_flat(
         kib_each: KiB a round from which on memory counts; with 0 it does not.
         again: makes as many more; then only what each time leaves behind counts.
         repeats: how often ``again`` is called at most.
+        along: what its process held before the rounds and after each, for a picture; ``again`` may
+            add to it.
 
     Raises:
         Failed: something was left each time.
@@ -78,11 +83,13 @@ def require_flat(
         wakes = process.wake_times(threads) if threads else []
         if wakes and lives.wait(lambda: not left(), min(SETTLE_S, max(wakes) + ENDED_S)):
             return
-    raise Failed(
-        expected=expected,
-        actual=f"After {rounds} {what} the process had {as_phrase(left())} than before."
-        f"{FIRST_TIME if again else ''}{process.others_note()}",
-    )
+    grown = as_phrase(left())
+    with with_picture(lambda: growth_picture(along, what, grown)):
+        raise Failed(
+            expected=expected,
+            actual=f"After {rounds} {what} the process had {grown} than before."
+            f"{FIRST_TIME if again else ''}{process.others_note()}",
+        )
 
 
 def require_flat_lives(
@@ -106,6 +113,7 @@ def require_flat_lives(
     def run_half() -> None:
         for _ in range(half):
             live()
+            along.append(lives.process.read_usage())
 
     began = time.monotonic()
     live()
@@ -113,10 +121,11 @@ def require_flat_lives(
     half = max(FEWEST_LIVES, min(most, fit)) // 2
     lives.subject.collect()
     before = lives.process.read_usage()
+    along = [before]
     run_half()
     require_flat(
         lives, before, half, what="lives", kib_each=kib_each, again=run_half,
-        repeats=max(1, POOLED_LIVES // half - 1),
+        repeats=max(1, POOLED_LIVES // half - 1), along=along,
         expected=f"{2 * half} lives leave no thread and no file behind, and less than {kib_each} "
         "KiB a life.",
     )  # fmt: skip

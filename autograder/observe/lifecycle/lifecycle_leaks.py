@@ -51,12 +51,14 @@ class LifecycleLeaks:
         lives = self._lives
         lives.subject.collect()
         nodes, before = len(lives.list_made()), lives.process.read_usage()
+        along = [before]
 
         def make_rounds() -> None:
             for _ in range(rounds):
                 self._manager.make_transitions(*UP)
                 lives.advance(ACTIVE_S)
                 self._manager.make_transitions(*DOWN)
+                along.append(lives.process.read_usage())
 
         make_rounds()
         leave = f"{rounds} rounds from “configure” to “cleanup” leave"
@@ -68,6 +70,7 @@ class LifecycleLeaks:
             )
         require_flat(
             lives, before, rounds, what="rounds", kib_each=kib_each, again=make_rounds,
+            along=along,
             expected=f"{leave} no thread, no file, and less than {kib_each} KiB of memory each.",
         )  # fmt: skip
 

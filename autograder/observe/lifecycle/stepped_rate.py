@@ -10,8 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NoReturn
 
 from autograder.examination.exam import Failed
+from autograder.observe.findings import rate_picture, with_picture
 from autograder.observe.lifecycle.node_lives import NodeLives
 from course.runtime.waiting import Deadline
 
@@ -55,6 +57,8 @@ class StepCount:
     wanted: float
     most: int
     hz: float = 10.0
+    times_s: tuple[float, ...] = ()
+    """When they came, each known to a step; a picture shows it."""
 
     @property
     def is_number_right(self) -> bool:
@@ -121,6 +125,11 @@ class MessageCounter:
             if count.is_right:
                 self.lives.memory[_SLOWLY] = pace
                 return
+        title = f"{self.what.capitalize()}, by the robot's clock"
+        with with_picture(lambda: rate_picture(title, count.times_s, hz, seconds)):
+            self._refuse(count, seconds, when)
+
+    def _refuse(self, count: StepCount, seconds: int, when: str) -> NoReturn:
         time = "one second" if seconds == 1 else f"{seconds} seconds"
         expected = f"In {time} {count.wanted:.0f} {self.what} come{when}"
         if not count.is_number_right:
@@ -141,6 +150,7 @@ class MessageCounter:
         lives, wanted = self.lives, hz * seconds
         steps = max(STEPS, round(wanted * math.ceil(1 / hz / LONGEST_STEP_S)))
         before, late, most, last = self.count(), 0, 0, 0
+        times_s: list[float] = []
         patience = lives.start_patience(LATE_ASLEEP_S if pace else KEEP_UP_S)
         for step in range(1, steps + 1):
             self._move_on(OVER * seconds / steps, 1 / hz / SLICES, pace / steps)
@@ -156,9 +166,10 @@ class MessageCounter:
             now = self.count()
             late = max(0, due - now)
             most = max(most, now - last) if step > PHASE else 0
+            times_s += [seconds * step / steps] * (now - max(last, before))
             last = now
         self.let_arrive()
-        return StepCount(self.count() - before, wanted, most, hz)
+        return StepCount(self.count() - before, wanted, most, hz, tuple(times_s))
 
     def _move_on(self, seconds: float, part: float, pace: float) -> None:
         """Move simulated time on: at once, or part by part within ``pace`` s of wall time."""

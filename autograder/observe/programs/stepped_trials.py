@@ -167,5 +167,8 @@ def _outcome(trial: Trial[ObserverT], observer: ObserverT) -> Failed | None:
     try:
         trial(observer)
     except Failed as failed:
-        return Failed(expected=f"{failed.expected} {SO_IN_A_PROGRAM}", actual=failed.actual)
+        return Failed(
+            expected=f"{failed.expected} {SO_IN_A_PROGRAM}", actual=failed.actual,
+            picture=failed.picture,
+        )  # fmt: skip
     return None

@@ -23,6 +23,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, TypeVar
 
+from autograder.examination.pictures.picture import Series
 from autograder.observe.relays.arrivals import Arrivals
 from autograder.observe.relays.observed_process import ObservedProcess
 
@@ -38,6 +39,7 @@ UNCLEAR_S = 8.0  # for those that are neither fresh nor far behind
 STAMINA_S = 60.0  # until a machine on which messages never came at their rate proved too busy
 SPURT = 5  # messages that were handed on twice as fast as they come: their consumer can catch up
 GAPS, BETWEEN = 10, 5  # gaps in what was handed on, and messages at most between one and the next
+MOST_DRAWN = 100  # messages in a picture
 LOOKS_S = 0.05  # between two looks at all that was published and handed on
 SELDOM = 10  # times what the last look took: the more there is to see, and the busier the machine
 
@@ -97,6 +99,17 @@ class ConsumerLag:
             ended = time.time_ns()
             self._look_at_ns = ended + max(LOOKS_S * 1e9, SELDOM * (ended - began))
         return self._settled
+
+    def draw(self) -> Series:
+        """Return a picture of how old each message was when it was handed on."""
+        published = self._published.first_times(self._series)
+        handings = self._list_handings(published, sorted(published.values()))
+        points = [
+            (round((handing.when_ns - self._since_ns) / 1e9, 2), round(handing.age_s, 2))
+            for handing in handings[:: len(handings) // MOST_DRAWN + 1]
+        ]
+        title = f"How old the {self._noun} were when they were handed on, after the pause"
+        return Series(title, "seconds since the pause", "seconds old", tuple(points))
 
     def _examine_handings(self) -> bool:
         published = self._published.first_times(self._series)

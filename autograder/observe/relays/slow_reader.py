@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from typing import Generic
 
 from autograder.examination.exam import Failed, NotExaminable
+from autograder.examination.pictures.picture import Timeline
+from autograder.observe.findings import handled_picture
 from autograder.observe.patience import SETTLE_S
 from autograder.observe.relays.consumer_lag import ConsumerLag, watch_consumers
 from autograder.observe.relays.message_stream import (
@@ -258,6 +260,18 @@ class Pause(Generic[KindT]):
         return Backlog(
             self._counts[kind], len(published), kept, len(since), oldest_ns / 1e9,
             kind in self._early,
+        )  # fmt: skip
+
+    def draw(self, kind: KindT) -> Timeline:
+        """Return a picture of the messages that came in, and of which were handed on afterwards."""
+        published = self._published(kind)
+        began_ns = min(published.values(), default=self._resumed_ns)
+        ended_s = (self._resumed_ns - began_ns) / 1e9
+        title = f"What came in while the consumer was busy, and what it acted on then: {kind}"
+        return handled_picture(
+            title, f"{kind.noun}s that came in", self._kept(kind),
+            {number: (when - began_ns) / 1e9 for number, when in published.items()},
+            (ended_s - kind.most / kind.rate_hz, ended_s),
         )  # fmt: skip
 
     @property

@@ -4,10 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
+from autograder.examination.pictures.picture import (
+    MAX_LABEL_CHARS,
+    MAX_TITLE_CHARS,
+    Lane,
+    Timeline,
+)
 from autograder.observe.examiner.actions import SentGoal
+from autograder.observe.findings import with_picture
 from autograder.observe.nouns import Action
 from autograder.observe.observed_node import ObservedNode
 from autograder.observe.phrases import end_phrase
+
+MOST_DRAWN, SHORTEST_DRAWN_S = 100, 0.1
+"""Messages of feedback in a picture, and seconds that it shows at least."""
 
 
 class ObservedGoal:
@@ -48,11 +58,12 @@ class ObservedGoal:
     def _require_answer(self, accepted: bool, within_s: float) -> None:
         answers = {None: "not answered", True: "accepted", False: "rejected"}
         self._node.advance_until(lambda: self.sent.accepted is not None, within_s)
-        self._node.require_that(
-            self.sent.accepted is accepted,
-            f"{self.what} is {answers[accepted]}.",
-            f"It was {answers[self.sent.accepted]}.",
-        )
+        with with_picture(self.draw):
+            self._node.require_that(
+                self.sent.accepted is accepted,
+                f"{self.what} is {answers[accepted]}.",
+                f"It was {answers[self.sent.accepted]}.",
+            )
 
     def require_end(self, how: str, within_s: float, leeway_s: float = 0.0) -> None:
         """Require that it is over within so many s, and how it ended.
@@ -65,16 +76,18 @@ class ObservedGoal:
         Raises:
             Failed: it is not over then, or ended in another way.
         """
-        self._node.require_that(
-            self._node.advance_until(lambda: self.sent.end, within_s + leeway_s),
-            f"{self.what} is over, and {how}, within {within_s:g} s.",
-            "After that time there was no result.",
-        )
-        self._node.require_that(
-            self.sent.end == how,
-            f"{self.what} ends as {how}.",
-            f"It {end_phrase(self.sent.end)}.",
-        )
+        is_over = self._node.advance_until(lambda: self.sent.end, within_s + leeway_s)
+        with with_picture(self.draw):
+            self._node.require_that(
+                is_over,
+                f"{self.what} is over, and {how}, within {within_s:g} s.",
+                "After that time there was no result.",
+            )
+            self._node.require_that(
+                self.sent.end == how,
+                f"{self.what} ends as {how}.",
+                f"It {end_phrase(self.sent.end)}.",
+            )
 
     def require_cancel_accepted(self, within_s: float) -> None:
         """Ask the server to cancel it, and require that it says yes within so many s.
@@ -84,8 +97,34 @@ class ObservedGoal:
         """
         self._client.cancel(self.sent)
         self._node.advance_until(lambda: self.sent.cancel_accepted is not None, within_s)
-        self._node.require_that(
-            self.sent.cancel_accepted,
-            "A request to cancel is accepted.",
-            "It was not answered." if self.sent.cancel_accepted is None else "It was refused.",
-        )
+        with with_picture(self.draw):
+            self._node.require_that(
+                self.sent.cancel_accepted,
+                "A request to cancel is accepted.",
+                "It was not answered." if self.sent.cancel_accepted is None else "It was refused.",
+            )
+
+    def draw(self) -> Timeline:
+        """Return a picture of the goal's states so far, and of its feedback."""
+        sent, begin_s = self.sent, self.sent.sent_at_s
+        seconds = max(self._node.now_s - begin_s, SHORTEST_DRAWN_S)
+
+        def since_begin(*times_s: float | None) -> list[float]:
+            return [at - begin_s for at in times_s if at is not None]
+
+        accepted = since_begin(sent.answered_at_s) if sent.accepted else []
+        asked = since_begin(sent.cancel_asked_at_s)
+        end_s = [*since_begin(sent.ended_at_s), seconds][0]
+        lanes = (
+            Lane.of(
+                "the goal", {"event": since_begin(sent.ended_at_s)},
+                [(at, end_s, "busy") for at in accepted],
+            ),
+            Lane.of("its feedback", {"done": since_begin(*sent.feedback_at_s[-MOST_DRAWN:])}),
+            *(Lane.of("a cancel is asked for", {"due": [at]}) for at in asked),
+        )  # fmt: skip
+        legend = (
+            ("busy", "accepted, and executed"), ("event", f"over: {sent.end}"[:MAX_LABEL_CHARS]),
+        )  # fmt: skip
+        title = f"{self.what} since it was sent, by the node's clock"[:MAX_TITLE_CHARS]
+        return Timeline(title, seconds, lanes, legend)

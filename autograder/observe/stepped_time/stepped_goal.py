@@ -34,6 +34,7 @@ class SteppedGoal:
         action: what it was sent to.
         run: the goal as its sender sees it: its state, and its result.
         feedback: what counts of the feedback messages so far.
+        feedback_at_s: when each came, in s of the node's time.
     """
 
     def __init__(
@@ -57,10 +58,12 @@ class SteppedGoal:
             Failed: it is rejected, or not answered.
         """
         self.action, self.feedback = action, list[Any]()
+        self.feedback_at_s: list[float] = []
         self._observer = observer
 
         def note(message: Any) -> None:
             self.feedback.append(feedback(message.feedback))
+            self.feedback_at_s.append(observer.elapsed_s)
 
         self._listener = observer.node.create_subscription(
             action.type.Impl.FeedbackMessage, f"{action}/_action/feedback", note, UNDEMANDING

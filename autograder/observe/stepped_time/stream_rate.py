@@ -17,7 +17,9 @@ from typing import NamedTuple
 from rclpy.qos import ReliabilityPolicy
 
 from autograder.examination.exam import Failed
+from autograder.examination.pictures.picture import Timeline
 from autograder.observe.examiner.merged_subscriptions import MergedSubscription, Publication
+from autograder.observe.findings import rate_picture, with_picture
 from autograder.observe.nouns import Topic
 from autograder.observe.stepped_time.stepped_observer import STEP_S, SteppedObserver
 from course.runtime.waiting import Deadline
@@ -103,18 +105,23 @@ def count_published(publications: Sequence[Publication]) -> int:
 
 
 class StreamStretch:
-    """A stretch of the node's time, beginning now, and what is published on a topic in it."""
+    """A stretch of the node's time, beginning now, and what is published on a topic in it.
+
+    Attributes:
+        observer: whose time passes.
+        stream: listens to the topic.
+    """
 
     def __init__(self, observer: SteppedObserver, stream: MergedSubscription) -> None:
         """Begin; ``stream`` listens to the topic."""
-        self._observer, self._stream = observer, stream
+        self.observer, self.stream = observer, stream
         self._began_ns, self._began_s = time.time_ns(), observer.elapsed_s
         self._lag_s = LAG_S
 
     @property
     def seconds(self) -> float:
         """How long it is by now, in the node's time."""
-        return round(self._observer.elapsed_s - self._began_s, 3)
+        return round(self.observer.elapsed_s - self._began_s, 3)
 
     def run(self, seconds: float, hz: float) -> None:
         """Let the node's time pass, step by step; each step waits for the message that is due.
@@ -125,11 +132,11 @@ class StreamStretch:
             seconds: of the node's time.
             hz: about how many messages a second are expected.
         """
-        before = count_published(self._stream.publications)
+        before = count_published(self.stream.publications)
         for number in range(1, round(seconds / STEP_S) + 1):
-            self._observer.step()
+            self.observer.step()
             due = before + math.floor(number * STEP_S * hz + 1e-6) - 1  # one may be on its way
-            heard = self._stream.publications
+            heard = self.stream.publications
             is_lossy = count_published(heard) > len(heard)
             deadline = Deadline(LOST_S if is_lossy else self._lag_s)
             self._await_publications(due, deadline)
@@ -138,13 +145,13 @@ class StreamStretch:
 
     def _await_publications(self, due: int, deadline: Deadline) -> None:
         # A thread that rclpy put to sleep just when its time came sleeps until time moves again.
-        while not self._observer.wait(
-            lambda: count_published(self._stream.publications) >= due,
+        while not self.observer.wait(
+            lambda: count_published(self.stream.publications) >= due,
             min(NUDGE_S, deadline.seconds_left),
         ):
             if not deadline.seconds_left:
                 return
-            self._observer.host.source.nudge()
+            self.observer.host.source.nudge()
 
     def measure(self) -> StreamRate | None:
         """Return at which rate there have been messages, or None if none comes any more.
@@ -153,24 +160,31 @@ class StreamStretch:
         lost.
         """
         ended_ns, seconds = time.time_ns(), self.seconds
-        if not await_publication(self._observer, self._stream, ended_ns):
+        if not await_publication(self.observer, self.stream, ended_ns):
             return None
-        heard = self._stream.publications
+        heard = self.stream.publications
         before = [one for one in heard if one.published_ns < self._began_ns][-1:]
         seen = [one for one in heard if self._began_ns <= one.published_ns < ended_ns]
         following = next(one for one in heard if one.published_ns >= max(ended_ns, self._began_ns))
-        writers = self._observer.node.count_publishers(str(self._stream.topic))
+        writers = self.observer.node.count_publishers(str(self.stream.topic))
         if writers != 1 or not are_numbered([*before, *seen, following]):
             return StreamRate(len(seen) / seconds, len(seen) / seconds)
         fewest = seen[-1].number - seen[0].number + 1 if seen else 0
         most = following.number - (before[0].number if before else 0) - 1
         return StreamRate(fewest / seconds, most / seconds, *self._measure_pace(seen), True)
 
+    def draw(self, hz: float) -> Timeline:
+        """Return a picture of what came, beside what was due at a rate."""
+        heard = [one for one in self.stream.publications if one.published_ns >= self._began_ns]
+        times_s = [self.observer.clock_at(one.published_ns)[1] - self._began_s for one in heard]
+        title = f"Messages on {self.stream.topic}, by the node's clock"
+        return rate_picture(title, times_s, hz, self.seconds)
+
     def _measure_pace(self, seen: Sequence[Publication]) -> tuple[float, float]:
         if len(seen) < 2:
             return 0.0, math.inf
-        earliest_s, early_s = self._observer.clock_at(seen[0].published_ns)
-        late_s, latest_s = self._observer.clock_at(seen[-1].published_ns)
+        earliest_s, early_s = self.observer.clock_at(seen[0].published_ns)
+        late_s, latest_s = self.observer.clock_at(seen[-1].published_ns)
         many = seen[-1].number - seen[0].number
         shortest_s = late_s - early_s
         return many / (latest_s - earliest_s), many / shortest_s if shortest_s > 0 else math.inf
@@ -226,6 +240,13 @@ def require_stream(
             f"{observer.error_note()}.",
         )
     stretch = StreamStretch(observer, stream)
+    with with_picture(lambda: stretch.draw(sum(allowed) / 2)):
+        _require_proof(stretch, allowed, seconds, needed)
+
+
+def _require_proof(stretch: StreamStretch, allowed: Allowed, seconds: float, needed: str) -> None:
+    """Have a stretch go on until it proves a rate that is allowed; fail if it proves another."""
+    observer, stream = stretch.observer, stretch.stream
     while stretch.seconds < LONGEST_S:
         stretch.run(seconds, sum(allowed) / 2)
         rate = stretch.measure()
@@ -235,6 +256,6 @@ def require_stream(
                 actual=f"Some came, and then not one more in {longest_gap_s(observer, stream):g} s "
                 f"of the node's time{observer.error_note()}.",
             )
-        rate.require(topic, allowed)
+        rate.require(stream.topic, allowed)
         if rate.is_proved(allowed):
             return

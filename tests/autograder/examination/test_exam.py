@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -22,7 +23,7 @@ from autograder.examination.exam import (
     Part,
     unexamined_verdict,
 )
-from autograder.examination.verdict import CheckResult, Verdict
+from autograder.examination.verdict import CheckResult, Progress, Verdict
 
 
 @contextmanager
@@ -90,6 +91,20 @@ def sit(exam: Exam[list[str]], *parts: str) -> list[Verdict]:
 def checks(exam: Exam[list[str]], part: str) -> tuple[CheckResult, ...]:
     (verdict,) = sit(exam, part)
     return verdict.checks
+
+
+def test_who_follows_is_told_of_each_check_with_the_results_before_it(
+    exam: Exam[list[str]],
+) -> None:
+    told: list[Progress] = []
+    (verdict,) = exam.sit([Part("visible")], bench(), told.append)
+    assert [(p.title, p.number, p.of) for p in told] == [
+        ("It starts.", 1, 3),
+        ("It runs.", 2, 3),
+        ("It flies.", 3, 3),
+    ]
+    assert [p.so_far.checks for p in told] == [verdict.checks[:number] for number in range(3)]
+    assert Progress.from_data(json.loads(json.dumps(told[2].as_data()))) == told[2]
 
 
 def test_what_is_up_at_the_end_of_all_processes_is_left_up(exam: Exam[list[str]]) -> None:

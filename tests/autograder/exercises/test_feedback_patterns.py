@@ -13,7 +13,7 @@ from autograder.corpus import trials
 from autograder.examination.draws import USUAL_SEED
 from autograder.examination.verdict_text import Report
 from autograder.running import runner
-from tests.autograder.goldens import golden
+from tests.autograder.goldens import golden, with_titles_of_pictures
 from tests.machine import needs_isolation
 
 
@@ -45,4 +45,5 @@ def test_the_report_reads_as_it_should(name: str, part: str) -> None:
     # When the stub's slow timer comes round depends on when the examiner begins to look.
     late = r"become 0\.\d+, the last percentage was [\d.]*\d"
     text = re.sub(late, "become 0.6, the last percentage was 0.95", report(name, part))
+    text = with_titles_of_pictures(text)
     assert text == golden(f"patterns-{name.removeprefix('wrong-')}-{part}", text)

@@ -9,7 +9,7 @@ import pytest
 from autograder import corpus
 from autograder.corpus import trials
 from autograder.examination.verdict_text import Report
-from tests.autograder.goldens import golden
+from tests.autograder.goldens import golden, with_titles_of_pictures
 from tests.machine import needs_sandbox
 
 CASES = {case.name: case for case in corpus.load_cases("qos")}
@@ -31,4 +31,5 @@ def test_the_report_reads_as_it_should(name: str) -> None:
     # the last frames of the gap one may have got through.
     text = re.sub(r"\bof \d{3} readings", "of 151 readings", text)
     text = re.sub(r"\b[34] frames that were lost", "4 frames that were lost", text)
+    text = with_titles_of_pictures(text)
     assert text == golden(f"qos-{name}", text)

@@ -15,7 +15,7 @@ from autograder.corpus.trials import Notebooks, make_notebooks
 from autograder.examination.draws import USUAL_SEED
 from autograder.examination.verdict_text import Report
 from autograder.running import runner
-from tests.autograder.goldens import golden
+from tests.autograder.goldens import golden, with_titles_of_pictures
 from tests.machine import needs_isolation
 
 
@@ -39,6 +39,7 @@ def test_the_report_of_a_typical_mistake(
     reports = [repr(Report(verdict, hints=3)) for verdict in outcome.verdicts.values()]
     # A device of the examiner's has a random number in its name.
     text = re.sub(r"-[0-9a-f]{8}\b", "-1234abcd", "\n\n".join(reports)) + "\n"
+    text = with_titles_of_pictures(text)
     assert text == golden(f"resources-{name}", text)
 
 

@@ -7,7 +7,7 @@ import pytest
 from autograder import corpus
 from autograder.corpus import Case, trials
 from autograder.examination.verdict_text import Report
-from tests.autograder.goldens import golden
+from tests.autograder.goldens import golden, with_titles_of_pictures
 from tests.machine import needs_isolation
 
 CASES = {case.name: case for case in corpus.load_cases("safety")}
@@ -20,6 +20,7 @@ def test_the_report_reads_as_it_should(name: str) -> None:
     (trial,) = corpus.run([CASES[name]], *trials.make_notebooks("safety"), jobs=1)
     shown = [repr(Report(verdict, hints=3)) for verdict in trial.outcome.verdicts.values()]
     text = "\n".join(shown) + "\n"
+    text = with_titles_of_pictures(text)
     assert text == golden(f"safety-{name}", text)
 
 

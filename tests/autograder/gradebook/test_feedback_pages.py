@@ -19,6 +19,9 @@ from nbformat.v4 import (
     new_raw_cell,
 )
 
+from autograder.examination.pictures.picture import Series
+from autograder.examination.verdict import CheckResult, Verdict
+from autograder.examination.verdict_text import Report
 from autograder.gradebook.nbgrader_plugins.nbgrader_speedups import TOO_LONG, FeedbackExporter
 from autograder.gradebook.safe_html import allowed_html, page_texts
 from autograder.gradebook.safe_html.page_texts import Page
@@ -107,6 +110,22 @@ def test_html_that_runs_nothing_is_kept_and_whole(cell: NotebookNode, kept: str)
     ours = page(FeedbackExporter, new_notebook(cells=[cell, cell_of_the_grader(REPORT)]))
     assert kept in ours
     assert ours.count("<p>right</p>") >= 1
+
+
+def test_the_picture_of_a_check_is_on_its_page_and_a_drawing_of_a_students_is_not() -> None:
+    picture = Series("Threads over lives", "lives", "threads", ((0, 12), (1, 13)))
+    check = CheckResult("flat", "It is flat", "failed", 0.0, 1.0, picture=picture)
+    report = Report(Verdict("resources", "visible", (check,)))
+    shown = new_output("display_data", data={"text/html": report._repr_html_()})
+    theirs = new_output(
+        "display_data", data={"text/html": "<p>mine</p><svg><title>Threads</title></svg>"}
+    )
+    output = new_output(**allowed_html.screen_output(theirs, Page()))
+    cells = [new_code_cell("draw()", outputs=[output]), cell_of_the_grader(shown)]
+    made = page(FeedbackExporter, new_notebook(cells=cells))
+    assert made.count("<svg") == 1
+    assert read(made, features="html.parser").svg["aria-label"].startswith("Threads over lives.")
+    assert "<p>mine</p>" in made
 
 
 SCRIPT = "fetch('/formgrader/api/grades')"

@@ -13,6 +13,7 @@ from nbformat.v4 import new_code_cell, new_notebook
 
 from autograder.assignments import submission
 from autograder.corpus import Case
+from autograder.running import live_report
 from tests.autograder.conftest import Course
 
 Output = dict[str, Any]
@@ -51,6 +52,54 @@ def test_the_cell_shows_a_report_and_ends_with_the_points(
     assert "hint 1" in report(outputs[2])
     assert "hint 2" not in report(outputs[2])
     assert "hint 3" in report(outputs[3])
+
+
+class Watching(NotebookClient):
+    """Keeps each text that is displayed, also those that others have replaced since."""
+
+    def __init__(self, *sources: str) -> None:
+        cells = [new_code_cell(source) for source in sources]
+        super().__init__(new_notebook(cells=cells), timeout=120, allow_errors=True)
+        self.shown: list[str] = []
+
+    def process_message(self, msg: Output, *more: Any) -> Any:
+        if msg["msg_type"] in ("display_data", "update_display_data"):
+            self.shown.append(msg["content"]["data"]["text/plain"])
+        return super().process_message(msg, *more)
+
+
+def test_the_report_says_what_is_examined_and_grows_with_each_result(
+    course: Course, cases: dict[str, Case]
+) -> None:
+    check = "from autograder import check\ncheck('qos')"
+    watching = Watching(*given(course, cases["wrong-lidar-deep"]), check)
+    notebook = watching.execute()
+    starts, *examining, whole = watching.shown
+    assert starts == "qos: 0 points so far\nThe examiner starts."
+    for number, text in enumerate(examining, 1):
+        first, *results, now = text.splitlines()
+        assert first.endswith("points so far")
+        assert now.startswith(f"Examining {number} of {len(examining)}: ")
+        titles = [line for line in results if line[0] in "✔✘"]
+        assert len(titles) == number - 1
+        assert [line for line in whole.splitlines() if line[0] in "✔✘"][: number - 1] == titles
+    assert "✘ After a pause obstacle avoidance" in examining[-1]
+    assert "picture: " in whole
+    assert report(notebook.cells[-1].outputs) == whole
+    assert "<svg" in notebook.cells[-1].outputs[0]["data"]["text/html"]
+
+
+def test_an_examination_that_is_interrupted_says_so_in_its_report(
+    course: Course, cases: dict[str, Case]
+) -> None:
+    broken = (
+        "from autograder.running.start import ExaminerProcess\n"
+        "from autograder import check\n"
+        "def request(*_, **__): raise KeyboardInterrupt\n"
+        "ExaminerProcess.request = request\ncheck('qos')"
+    )
+    (outputs,) = run(broken)
+    assert report(outputs).splitlines()[-1] == live_report.ENDED
 
 
 def test_a_learners_own_running_nodes_do_not_disturb(

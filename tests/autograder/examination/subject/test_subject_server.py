@@ -31,6 +31,7 @@ from autograder.examination.check_context import StudentError, Subject, SubjectG
 from autograder.examination.subject import server
 from autograder.examination.subject.server import SubjectServer
 from autograder.examination.subject.student_errors import MUST_NOT_SPIN
+from autograder.examination.verdict import Progress, Verdict
 from autograder.processes.channel import Channel, ChannelClosed, ChannelTimeout
 from course import Session
 from course.runtime.context.context import default_context_beside
@@ -194,6 +195,30 @@ CLASSES = {
 def outside() -> Iterator[Session]:
     with Session() as session:
         yield session
+
+
+def test_progress_is_shown_in_the_thread_that_serves() -> None:
+    ours, theirs = socket.socketpair()
+    shown: list[tuple[Any, str]] = []
+
+    def show(progress: Any) -> None:
+        shown.append((progress, threading.current_thread().name))
+
+    def open_session(threads: int, sim_time: bool) -> Session:
+        raise AssertionError("nothing of the student's is asked for")
+
+    serving = SubjectServer(open_session, {}, show)
+    served = threading.Thread(target=serving.serve, args=(Channel(theirs),), name="main")
+    served.start()
+    subject = Subject(Channel(ours))
+    progress = Progress(Verdict("qos", "visible", ()), "It starts.", 1, 3)
+    subject.show(progress)
+    assert [(Progress.from_data(told), thread) for told, thread in shown] == [(progress, "main")]
+    subject.release()
+    served.join(20)
+    assert not served.is_alive()
+    ours.close()
+    theirs.close()
 
 
 @pytest.fixture

@@ -154,3 +154,15 @@ def test_a_quick_consumer_is_able_only_if_something_it_hands_on_is_not_too_old(
     watched = lag_of(published, handed, resumed)
     assert not watched.is_settled()
     assert watched.is_able is able
+
+
+def test_a_picture_of_it_shows_how_messages_get_older() -> None:
+    resumed = time.time_ns() - 5 * S
+    published = at_rate(resumed, 5)
+    handed = [(number, resumed + 2 * number * PERIOD) for number in range(1, 250)]
+    picture = lag_of(published, handed, resumed).draw()
+    assert picture.points[0] == (0.02, 0.01)
+    assert picture.points[-1][0] > 4.9
+    ages = [age for _, age in picture.points]
+    assert ages == sorted(ages)
+    assert len(ages) <= 100
