@@ -109,7 +109,7 @@ def test_what_some_exams_need_of_the_course_belongs_to_these(covered: dict[str, 
     [
         "course.views", "course.watch", "course.diagnosis", "course.doctor",
         "course.workspace",
-        "course.learner_session.session", "course.notebook", "quizzes",
+        "course.learner_session.session", "course.cell_news", "course.notebook", "quizzes",
         "autograder.examination.verdict_text", "autograder.examination.pictures.drawing",
         "autograder.examination.pictures.wording", "autograder.running.live_report",
         "autograder.gradebook.feedback.feedback_page",

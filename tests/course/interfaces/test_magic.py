@@ -49,7 +49,7 @@ def test_an_import_that_builds_says_so_before_and_only_then(
         "SetBool"
     )
     assert "once: it is kept for the next time." in text
-    assert [output.text for output in again] == ["imported\nSetBool\n"]
+    assert "".join(output.text for output in again) == "imported\nSetBool\n"
 
 
 def only_error(outputs: list[Any]) -> str:
