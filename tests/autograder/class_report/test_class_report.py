@@ -611,8 +611,8 @@ def test_the_report_of_a_graded_class(graded: Path) -> None:
     ]  # fmt: skip
     assert report.data.absent == ("zoe",)
     by_title = {mean.title: mean for mean in report.means.questions}
-    assert (by_title["Durability"].n, by_title["Durability"].waiting) == (2, 3)
-    assert by_title["Durability"].mean == 0.5
+    depth = by_title["History and depth"]
+    assert (depth.n, depth.waiting, depth.mean) == (2, 3, 1.25)
     html = page.read_text()
     assert Links(html).loads == []
     assert Links(html).open == []
