@@ -694,7 +694,7 @@ def test_the_command_speaks_to_people_and_to_machines(graded: Path) -> None:
     spoken = json.loads(autograder("report", ASSIGNMENT, *root, "--json", cwd=graded).stdout)
     assert len(spoken["checks"]) == len(exercises.load_exam("qos").checks)
     assert spoken["absent"] == ["zoe"]
-    assert len(spoken["means"]["questions"]) == 7
+    assert len(spoken["means"]["questions"]) == 4
     assert {"-dan", "bob"} <= {pair["left"] for pair in spoken["alike"]}
 
 
