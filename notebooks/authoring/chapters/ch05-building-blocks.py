@@ -268,9 +268,7 @@ check.logger_hears(session, logger, topic)
 # images.
 
 # %% tags=["notebook-only", "try"]
-from rclpy.qos import (
-    DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy, qos_check_compatible,
-)  # fmt: skip
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
 requested = ReliabilityPolicy.RELIABLE  # YOURS
@@ -286,7 +284,6 @@ with course.Session() as bench:
     found = check.images_arrive(bench, images, seen)
     warnings = [row.message for row in bench.logs(level="WARN")]
 
-print("rclpy says:", qos_check_compatible(offer, request)[1] or "they fit")
 print("The log says:", *warnings or ["nothing"])
 found
 
@@ -772,10 +769,15 @@ check.robot_is_active(mode)
 from std_srvs.srv import Trigger
 
 
-class HowFar(Watcher):
+class HowFar(Node):
     def __init__(self):
-        super().__init__()
+        super().__init__("range_finder")
+        self.nearest = None
+        self.create_subscription(LaserScan, "scan", self.look, 10)
         self.create_service(Trigger, "how_far", self.answer)
+
+    def look(self, scan):
+        self.nearest = min(scan.ranges)
 
     def answer(self, request, response):
         response.success = self.nearest is not None
@@ -1572,10 +1574,10 @@ session.diagnose()
 # fitting QoS they make applications that are robust, efficient and easy to maintain, from a single
 # robot to a team of them.
 #
-# How far you are, exercises and quiz included:
+# What still runs of all that you have started is the robot of the beginning, and your nodes:
 
 # %% tags=["notebook-only"]
-course.progress()
+# %ros node list
 
 # %% [markdown]
 # ## Part 2 Quiz
@@ -1598,4 +1600,4 @@ course.progress()
 # parameters and timers, and connect to real hardware. It takes you from understanding the building
 # blocks to building production-ready robotic applications with them.
 #
-# *Your robot at the top goes on until you end it, or close this notebook:* `course.close()`
+# *The robot at the top goes on until you close this notebook, or say* `course.close()`.
