@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from course.learner_session.default_session import stop as stop
     from course.learner_session.default_session import until as until
     from course.learner_session.default_session import wait_for_service as wait_for_service
+    from course.learner_session.default_session import world as world
     from course.learner_session.session import Session as Session
     from course.notebook import load_ipython_extension as load_ipython_extension
     from course.notebook import unload_ipython_extension as unload_ipython_extension
@@ -67,6 +68,7 @@ _HOMES = {
     "stop": "course.learner_session.default_session",
     "until": "course.learner_session.default_session",
     "wait_for_service": "course.learner_session.default_session",
+    "world": "course.learner_session.default_session",
     "Design": "course.design.declaration",
     "DesignError": "course.design.endpoints",
     "CourseError": "course.errors",

@@ -5,7 +5,8 @@ from __future__ import annotations
 import functools
 import threading
 from collections.abc import Callable
-from typing import Any, TypeVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -21,6 +22,9 @@ from course.runtime.context.context import (
 from course.runtime.logs.table import LogTable
 from course.runtime.requests.actions import GoalRun
 from course.runtime.requests.recorder import Recorder
+
+if TYPE_CHECKING:
+    from course.worlds.running_world import RunningWorld
 
 T = TypeVar("T")
 
@@ -140,6 +144,11 @@ def logs(node: Any = None, *, level: str = "INFO", last: int | None = 50) -> Log
 def spin() -> None:
     """Block until Ctrl-C, SIGTERM or the end of the session; see `Session.spin`."""
     session().spin()
+
+
+def world(name: str | Path = "warehouse", *, seed: int = 0) -> RunningWorld:
+    """Return a simulated floor with a robot on it; see `Session.world`."""
+    return session().world(name, seed=seed)
 
 
 def _check_options(open_session: Session, options: dict[str, Any]) -> None:

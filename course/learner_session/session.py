@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rclpy.action.graph import get_action_names_and_types
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from course.views.qos_lab import QoSLab
     from course.views.service import ServiceConsole
     from course.views.timeline import Timeline
+    from course.worlds.running_world import RunningWorld
 
 
 class Session(CoreSession):
@@ -31,6 +33,32 @@ class Session(CoreSession):
 
     The views are imported when one is asked for. Attributes are those of `CoreSession`.
     """
+
+    _world: RunningWorld | None = None
+
+    def world(self, name: str | Path = "warehouse", *, seed: int = 0) -> RunningWorld:
+        """Return a simulated floor with a robot on it, which runs as a node of this session.
+
+        The node publishes the robot's sensors and drives by ``cmd_vel``. It follows the session's
+        clock, and ends with the session, or when you ask for a world again.
+
+        Args:
+            name: "warehouse", "corridor", or the path of a floor plan of your own (YAML).
+            seed: decides on the noise of the sensors: the same seed makes the same noise.
+
+        Raises:
+            FloorPlanError: there is no such floor plan, or it is not sound.
+            SessionError: the session is closed.
+        """
+        from course.worlds.floor_plan import load_floor_plan
+        from course.worlds.running_world import RunningWorld
+
+        self.require_open()
+        plan = load_floor_plan(name)
+        if self._world is not None:
+            self._world.close()
+        self._world = RunningWorld(self, plan, seed)
+        return self._world
 
     def graph(self, *, everything: bool = False) -> GraphView:
         """Return a live view of the ROS graph as this session sees it.

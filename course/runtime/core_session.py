@@ -156,6 +156,17 @@ class CoreSession:
         """
         return self._host.run_beside(factory)
 
+    def run_apart(self, factory: Factory, purpose: str) -> Node:
+        """Make a node and spin it in one thread that only nodes of this purpose share.
+
+        No callback of a learner's can hold it up, as for a simulated world; in all else it is as
+        with `run`.
+
+        Raises:
+            SessionError: the session is closed, or the factory made no node for it.
+        """
+        return self._host.run_apart(factory, purpose)
+
     def stop(self, *what: Any) -> None:
         """Stop nodes and take them off the graph; without arguments, every node. Idempotent.
 

@@ -76,6 +76,11 @@ class NodeHost:
         self.require_open()
         return self.registry.run(factory, (), {}, self.threads, replace=False)
 
+    def run_apart(self, factory: Factory, purpose: str) -> Node:
+        """Make a node and spin it in one thread that only nodes of this purpose share."""
+        self.require_open()
+        return self.registry.run(factory, (), {}, 1, purpose=purpose)
+
     def stop(self, *what: Any) -> None:
         """Stop nodes and take them off the graph; without arguments, every node. Idempotent."""
         for entry in self.registry.find(what):

@@ -87,8 +87,12 @@ class NodeRegistry:
         threads: int,
         *,
         replace: bool = True,
+        purpose: str = "",
     ) -> Node:
-        """Make a node and spin it; see `Session.run` and, for ``replace=False``, `run_beside`."""
+        """Make a node and spin it in the executor for ``purpose``; see `Session.run`.
+
+        For ``replace=False`` see `run_beside`, for a purpose `run_apart`.
+        """
         argument_checks.check_factory(factory, args, kwargs)
         key = _make_key(factory, args, kwargs) if replace else None
         for entry in self.list_nodes():
@@ -113,7 +117,7 @@ class NodeRegistry:
             self.half_made.clear(lambda remains: remains.name == name)
         for callback in self.on_made:
             callback(node)
-        executor = self._pool.get_executor(threads)
+        executor = self._pool.get_executor(threads, purpose)
         with self._lock:
             self._entries[node] = RegisteredNode(node, name, key, factory, executor)
             self._made_by[name] = factory

@@ -1,0 +1,1 @@
+"""The robot: its base, its gripper, and what its sensors read."""
