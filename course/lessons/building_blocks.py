@@ -246,8 +246,6 @@ def spiral_is_driven(session: CoreSession, world: Any, track: Recorder) -> Check
 
     if not (found := keep_looking(session, has_result, SPIRAL_PATIENCE_S)).passed:
         return found
-    if world.simulation.describe_moment()["robot"]["touching"]:
-        return say_not_yet("the robot has driven into something. Run the cell again.")
     turned = math.degrees(turning_of([stamped.message for stamped in track.messages]))
     least, most = ROUND_TRIP_DEG
     if not least <= turned <= most:
@@ -255,6 +253,8 @@ def spiral_is_driven(session: CoreSession, world: Any, track: Recorder) -> Check
             f"the robot turned by {turned:.0f}° on its way; four quarter circles are 360°. It "
             "turns with speed / radius."
         )
+    if world.simulation.describe_moment()["robot"]["touching"]:
+        return say_not_yet("the robot has driven into something. Run the cell again.")
     return say_yes(f"a spiral: the robot turned by {turned:.0f}° on its way.")
 
 

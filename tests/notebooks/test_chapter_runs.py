@@ -1,4 +1,4 @@
-"""Chapter 5 in a kernel: as it is handed out, and when a learner has done all that there is to do."""
+"""Chapter 5 in a kernel: as it is handed out, and when a learner has answered everything."""
 
 from __future__ import annotations
 

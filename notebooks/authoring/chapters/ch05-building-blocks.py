@@ -780,12 +780,13 @@ class HowFar(Node):
         self.nearest = min(scan.ranges)
 
     def answer(self, request, response):
-        response.success = self.nearest is not None
+        response.success = True
         ...  # YOURS: response.message = f"{self.nearest:.2f} m"
         return response
 
 
-session.run(HowFar)
+range_finder = session.run(HowFar)
+session.until(lambda: range_finder.nearest, timeout=30.0, what="a scan")
 check.how_far_answers(session)
 
 # %% [markdown]
@@ -1464,6 +1465,7 @@ system.logs(level="INFO", last=30)
 # drive again. When you have seen enough, end it:
 
 # %% tags=["notebook-only"]
+system.stop()  # first the nodes, so that ActionNode ends a drive that is under way
 system_report = system.close()
 print("Leaked:", system_report.leaked or "nothing")
 
