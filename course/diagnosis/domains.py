@@ -47,7 +47,8 @@ def next_door(session: CoreSession, sought: str = "") -> Iterator[HealthFinding]
     """
     own = session.nodes
     graph = reader.read_graph(session.observer, own=list(own.values()))
-    missed = [*unoffered_names(graph, set(own)), *([sought] if sought else [])]
+    learners = set(own).difference(session.nodes_apart())
+    missed = [*unoffered_names(graph, learners), *([sought] if sought else [])]
     here = session.offered(missed)
     missed = [name for name in missed if name not in here]
     for other in domain_discovery.ask_other_sessions(missed) if missed else []:

@@ -29,8 +29,9 @@ def check_graph(session: CoreSession) -> Iterator[HealthFinding]:
     graph = reader.read_graph(session.observer, own=list(own.values()))
     yield from find_mismatches(graph)
     yield from find_twins(graph, set(own))
-    yield from lonely_topics(graph, set(own))
-    yield from lonely_clients(graph, set(own))
+    learners = set(own).difference(session.nodes_apart())
+    yield from lonely_topics(graph, learners)
+    yield from lonely_clients(graph, learners)
 
 
 def find_mismatches(graph: Graph) -> Iterator[HealthFinding]:

@@ -128,7 +128,7 @@ def _topic_names(node: Node, only: Sequence[object] | None = None) -> str:
 
 def _describe_unconfigured(session: CoreSession, name: str) -> str:
     graph = reader.read_graph(session.observer, own=list(session.nodes.values()))
-    missed = unoffered_names(graph, set(session.nodes))
+    missed = unoffered_names(graph, set(session.nodes).difference(session.nodes_apart()))
     may_be = f", {', '.join(missed)} perhaps, which nobody offers" if missed else ""
     return f"{name} is unconfigured: what its on_configure() makes is not there yet{may_be}."
 

@@ -456,6 +456,10 @@ class CoreSession:
         """Return the names of paused nodes."""
         return [entry.name for entry in self._host.registry.list_nodes() if entry.paused]
 
+    def nodes_apart(self) -> list[str]:
+        """Return the names of nodes made by `run_apart`: they are no work of a learner's."""
+        return [entry.name for entry in self._host.registry.list_nodes() if entry.apart]
+
     # Closing.
 
     @property

@@ -42,7 +42,6 @@ class PacedSimulation:
         self._speed = 1.0
         self._anchor_ns: int | None = None
         self._taken = 0  # steps since the anchor
-        self._now_ns = 0
 
     @property
     def speed(self) -> float:
@@ -69,16 +68,19 @@ class PacedSimulation:
         """Begin at a time of the clock."""
         self._anchor(now_ns)
 
+    def resume(self, now_ns: int) -> None:
+        """Go on after a pause, which is not made up for."""
+        if self.paused:
+            self._anchor(max(now_ns, self._last_stamp_ns))
+            self.paused = False
+
     def steps_due(self, now_ns: int) -> Iterator[tuple[int, Readings]]:
         """Take the steps that are due; yield the time of each (ns of the clock) and its readings.
 
         Args:
             now_ns: what the clock says.
         """
-        if self._anchor_ns is None:
-            return
-        if self.paused:
-            self._anchor(max(now_ns, self._last_stamp_ns))
+        if self._anchor_ns is None or self.paused:
             return
         if not self.exact:
             self._bound_catch_up(now_ns)

@@ -137,11 +137,16 @@ class RunningWorld:
 
     def pause(self) -> None:
         """Stand still, whatever the clock does. Idempotent."""
-        self._set_paused(paused=True)
+        with self._paced.lock:
+            self._control()
+            self._node.advance()
+            self._paced.paused = True
 
     def resume(self) -> None:
         """Go on. Idempotent."""
-        self._set_paused(paused=False)
+        with self._paced.lock:
+            self._control()
+            self._paced.resume(self._node.now_ns)
 
     def step_once(self) -> None:
         """Take 0.1 s at once; for a world that is paused."""
@@ -170,12 +175,6 @@ class RunningWorld:
             self._session.stop(self._node)
 
     # Inside.
-
-    def _set_paused(self, *, paused: bool) -> None:
-        with self._paced.lock:
-            self._control()
-            self._node.advance()
-            self._paced.paused = paused
 
     def _control(self) -> Simulation:
         """Return the simulation; hold the lock for longer than one call."""

@@ -35,13 +35,17 @@ Factory = Callable[..., Node]
 
 @dataclass
 class RegisteredNode:
-    """A node that a session runs; ``held`` are those that it brought along, while it is paused."""
+    """A node that a session runs; ``held`` are those that it brought along, while it is paused.
+
+    ``apart`` says whether it is one of the session's own, see `Session.run_apart`.
+    """
 
     node: Node
     name: str
     key: Hashable
     factory: object
     executor: BackgroundExecutor
+    apart: bool = False
     paused: bool = False
     held: list[Node] = field(default_factory=list)
 
@@ -119,7 +123,9 @@ class NodeRegistry:
             callback(node)
         executor = self._pool.get_executor(threads, purpose)
         with self._lock:
-            self._entries[node] = RegisteredNode(node, name, key, factory, executor)
+            self._entries[node] = RegisteredNode(
+                node, name, key, factory, executor, apart=bool(purpose)
+            )
             self._made_by[name] = factory
             executor.add_node(node)  # under the lock: a node without executor looks stolen
         return node

@@ -83,6 +83,8 @@ class Robot:
 
     def step(self, floor: Floor, *, at_charger: bool) -> None:
         """Move on by one step."""
+        if self.jammed or self._energy_j <= 0.0:
+            self.speed = self.turn = 0.0
         speed, turn = self._next_speeds()
         before = self.speed
         forward, angle = (self.speed + speed) / 2 * STEP_S, (self.turn + turn) / 2 * STEP_S
@@ -131,7 +133,7 @@ class Robot:
         free, blocked = 0.0, 1.0
         while (blocked - free) * abs(forward) > _CONTACT_M / 10:
             middle = (free + blocked) / 2
-            x, y, _ = self._reach(forward * middle, angle * middle)
+            x, y, _ = self._reach(forward * middle, angle)
             if floor.clearance(x, y) >= ROBOT_RADIUS_M:
                 free = middle
             else:
