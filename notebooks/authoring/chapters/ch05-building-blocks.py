@@ -20,7 +20,6 @@
 # %% tags=["notebook-only"]
 # %load_ext course
 import course
-from course.lessons import building_blocks as check
 from rclpy.node import Node
 from sensor_msgs.msg import LaserScan
 
@@ -66,6 +65,7 @@ world
 # `0.0`, and run the cell.
 
 # %% tags=["notebook-only", "try"]
+from course.lessons import building_blocks as check
 from geometry_msgs.msg import Twist
 
 command = Twist()
@@ -89,7 +89,7 @@ check.robot_drives(world)
 # in the world), the three tiers of a robot's software (planning, sequencing, control), and that
 # ROS 2 is the layer through which their programs talk.
 #
-# Now see who talks to whom. Boxes are nodes, and arrows go through topics; point at one for more.
+# Now see who talks to whom. Round shapes are nodes, boxes are topics; point at one for more.
 
 # %% tags=["notebook-only"]
 session.graph()
