@@ -24,7 +24,7 @@ from course.runtime.requests.actions import GoalRun
 from course.runtime.requests.recorder import Recorder
 
 if TYPE_CHECKING:
-    from course.worlds.running_world import RunningWorld
+    from course.views.world import World
 
 T = TypeVar("T")
 
@@ -146,8 +146,8 @@ def spin() -> None:
     session().spin()
 
 
-def world(name: str | Path = "warehouse", *, seed: int = 0) -> RunningWorld:
-    """Return a simulated floor with a robot on it; see `Session.world`."""
+def world(name: str | Path = "warehouse", *, seed: int = 0) -> World:
+    """Return a live view of a simulated floor with a robot on it; see `Session.world`."""
     return session().world(name, seed=seed)
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from course.views.qos_lab import QoSLab
     from course.views.service import ServiceConsole
     from course.views.timeline import Timeline
-    from course.worlds.running_world import RunningWorld
+    from course.views.world import World
 
 
 class Session(CoreSession):
@@ -34,10 +34,10 @@ class Session(CoreSession):
     The views are imported when one is asked for. Attributes are those of `CoreSession`.
     """
 
-    _world: RunningWorld | None = None
+    _world: World | None = None
 
-    def world(self, name: str | Path = "warehouse", *, seed: int = 0) -> RunningWorld:
-        """Return a simulated floor with a robot on it, which runs as a node of this session.
+    def world(self, name: str | Path = "warehouse", *, seed: int = 0) -> World:
+        """Return a live view of a simulated floor with a robot on it, a node of this session.
 
         The node publishes the robot's sensors and drives by ``cmd_vel``. It follows the session's
         clock, and ends with the session, or when you ask for a world again.
@@ -50,6 +50,7 @@ class Session(CoreSession):
             FloorPlanError: there is no such floor plan, or it is not sound.
             SessionError: the session is closed.
         """
+        from course.views.world import World
         from course.worlds.floor_plan import load_floor_plan
         from course.worlds.running_world import RunningWorld
 
@@ -57,7 +58,7 @@ class Session(CoreSession):
         plan = load_floor_plan(name)
         if self._world is not None:
             self._world.close()
-        self._world = RunningWorld(self, plan, seed)
+        self._world = World(self, RunningWorld(self, plan, seed))
         return self._world
 
     def graph(self, *, everything: bool = False) -> GraphView:

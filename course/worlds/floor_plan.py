@@ -149,9 +149,9 @@ def _explain_yaml(error: yaml.YAMLError) -> str:
 
 
 def _explain_schema(error: ValidationError, source: str) -> str:
-    """Return the first of the faults as a sentence."""
+    """Return a fault as a sentence: an unknown field first, which may be why one is missing."""
     details = error.errors(include_url=False)
-    first = details[0]
+    first = next((each for each in details if each["type"] == "extra_forbidden"), details[0])
     more = _FURTHER.format(len(details) - 1) if len(details) > 1 else ""
     steps = [str(step + 1) if isinstance(step, int) else str(step) for step in first["loc"]]
     where = f"{source}, field {' '.join(steps)}" if steps else source
@@ -167,7 +167,7 @@ def _explain_schema(error: ValidationError, source: str) -> str:
     elif kind == "string_pattern_mismatch":
         phrase = f"{str(given)[:60]!r} is no name of a node: write lower-case letters, digits and _"
     elif kind == "value_error":
-        phrase = str(first["ctx"]["error"])
+        return f"{source}, {first['ctx']['error']}{more}."
     else:
         rule = first["msg"].removeprefix("Input ").replace("should", "it must", 1)
         phrase = f"{rule}, not {str(given)[:60]!r}: correct it"

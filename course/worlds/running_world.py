@@ -48,6 +48,8 @@ class RunningWorld:
         node = session.run_apart(make_node, EXECUTOR)
         assert isinstance(node, WorldNode)
         self._node = node
+        with self._paced.lock:
+            self._paced.start(node.now_ns)  # now: in its constructor a node's simulated time is 0
 
     # Looking.
 

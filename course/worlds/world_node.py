@@ -70,7 +70,7 @@ class WorldNode(Node):
     """Moves a paced simulation on, publishes its readings, and passes commands to it."""
 
     def __init__(self, name: str, paced: PacedSimulation) -> None:
-        """Make the node; the world begins now."""
+        """Make the node; the world begins with `paced.start`."""
         super().__init__(name)
         self._paced = paced
         self._simulation = paced.simulation
@@ -88,7 +88,6 @@ class WorldNode(Node):
         self._reply = self._gripper.send_response
         self._gripper.send_response = self._send_gripper_reply  # type: ignore[method-assign]
         self._late_replies: list[list[Any]] = []  # steps left, response, header
-        paced.start(self.now_ns)
         self.create_timer(STEP_S if paced.exact else WALL_PERIOD_S, self.advance)
 
     @property
@@ -174,7 +173,7 @@ class WorldNode(Node):
     def _send_late_replies(self) -> None:
         for waiting in self._late_replies:
             waiting[0] -= 1
-            if waiting[0] <= 0:
+            if waiting[0] <= 0 and self._has_radio:
                 self._reply(waiting[1], waiting[2])
         self._late_replies = [waiting for waiting in self._late_replies if waiting[0] > 0]
 

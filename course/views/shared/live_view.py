@@ -7,22 +7,22 @@ import json
 import threading
 import time
 from abc import ABC, abstractmethod
-from functools import cache
-from pathlib import Path
 from typing import Any, ClassVar
 
-import anywidget
-import traitlets
 from rclpy.exceptions import InvalidHandle
 
 from course.runtime.core_session import CoreSession
 from course.views.shared import truncate
+from course.views.shared.live_widget import LiveWidget, widget_class
 from course.views.shared.refresher import ticker_of
 from course.views.shared.static_fallback import saved_output
 from course.views.shared.view_registry import registry_of
 
 MIN_PERIOD_S = 0.1
-"""Seconds between two frames at least: ten a second, whatever the publishers do."""
+"""Seconds between two frames of most views: ten a second, whatever the publishers do."""
+
+SLOW_PERIOD_S = 0.5
+"""Seconds between two sendings of a view's `slow_parts`, and of its words if it has such parts."""
 
 PATIENCE = 20
 """Frames that may be on their way before a browser that confirms none gets one a second only."""
@@ -38,28 +38,7 @@ MAX_WORDS_CHARS = 15_000
 
 CLOSED = "The session has been closed."
 
-_STATIC = Path(__file__).parents[1] / "static"
-
 Frame = dict[str, Any]
-
-
-class LiveWidget(anywidget.AnyWidget):
-    """The browser's end of a view. It draws `make_frame` and knows nothing of ROS.
-
-    Attributes:
-        frame: what to draw; JSON data.
-        words: the same as text, for screen readers.
-        ended: why nothing comes any more; empty while the view is live.
-        notice: what else should be known of what is shown.
-        number: counts frames; the browser sends back the number that it has drawn.
-    """
-
-    kind = traitlets.Unicode().tag(sync=True)
-    frame = traitlets.Dict().tag(sync=True)
-    words = traitlets.Unicode().tag(sync=True)
-    ended = traitlets.Unicode().tag(sync=True)
-    notice = traitlets.Unicode().tag(sync=True)
-    number = traitlets.Int().tag(sync=True)
 
 
 class LiveView(ABC):
@@ -85,16 +64,24 @@ class LiveView(ABC):
     period: ClassVar[float] = MIN_PERIOD_S
     """Seconds between two looks at the model."""
 
+    fixed_parts: ClassVar[tuple[str, ...]] = ()
+    """Keys of its frame that never change: they are sent once."""
+
+    slow_parts: ClassVar[tuple[str, ...]] = ()
+    """Keys of its frame that may come late: they are sent every `SLOW_PERIOD_S`, and at once after
+    a control was used. A view of more than ten frames a second stays small so."""
+
     def __init__(self, session: CoreSession, *about: Any) -> None:
         """Show what happens in ``session``; ``about`` tells views of one kind from each other."""
         self.session = session
         self.resources = contextlib.ExitStack()
         self._widget: LiveWidget | None = None
-        self._due = 0.0
-        self._last = ""
+        self._due = self._slow_due = 0.0
+        self._last = self._words = ""
         self._drawn = 0
         self._stumbles = 0
         self._why = ""
+        self._saved: Any = None
         self._looking = threading.RLock()
         registry_of(session).put(self, (type(self).__qualname__, repr(about)))
 
@@ -110,6 +97,10 @@ class LiveView(ABC):
         """Return both, of one and the same moment."""
         return self.make_frame(), self.words()
 
+    def picture(self) -> str:
+        """Return an SVG document of what there is to see now, for a saved notebook; "" for none."""
+        return ""
+
     def handle_control(self, message: dict[str, Any]) -> None:  # noqa: B027 - some views have no controls
         """Do what a control in the browser asks for. Runs in the kernel's main thread."""
 
@@ -117,7 +108,7 @@ class LiveView(ABC):
     def widget(self) -> LiveWidget:
         """The widget that shows this view; made, and kept up to date, from its first use."""
         if self._widget is None:
-            self._widget = _widget_class((*self.shared, self.script))(kind=self.script)
+            self._widget = widget_class((*self.shared, self.script))(kind=self.script)
             self._widget.on_msg(self._on_message)
             self._refresh_widget()
             self._widget.ended = self._why
@@ -153,6 +144,7 @@ class LiveView(ABC):
             first, self._why = not self._why, self._why or why
         if first:
             ticker_of(self.session).forget(self)
+            self._keep_last_look()
             self.resources.close()
             if self._widget is not None:
                 self._widget.ended = why
@@ -183,7 +175,16 @@ class LiveView(ABC):
         data, metadata = self._repr_mimebundle_(**kwargs)
         display(data, metadata=metadata, raw=True)  # type: ignore[no-untyped-call]
         if len(data) > 1:
-            display(saved_output(self.label, data["text/plain"]), raw=True)  # type: ignore[no-untyped-call]
+            saved = saved_output(self.label, data["text/plain"], self.picture())
+            self._saved = display(saved, raw=True, display_id=True)  # type: ignore[no-untyped-call]
+
+    def _keep_last_look(self) -> None:
+        """Put what was seen last into the output that a saved notebook shows."""
+        if self._saved is None:
+            return
+        with contextlib.suppress(Exception):  # what it shows may be gone: the first look stays
+            saved = saved_output(self.label, self._words, self.picture())
+            self._saved.update(saved, raw=True)
 
     def _refresh_widget(self) -> None:
         with self._looking:
@@ -192,7 +193,7 @@ class LiveView(ABC):
                 return
             try:
                 frame, words = self.look()
-                words = truncate.cut_text(words, MAX_WORDS_CHARS)
+                words = self._words = truncate.cut_text(words, MAX_WORDS_CHARS)
                 text = json.dumps([frame, words])
                 self._stumbles = 0
             except Exception as error:  # noqa: BLE001 - a view must never take its thread down
@@ -204,15 +205,21 @@ class LiveView(ABC):
                 return
             if text == self._last:
                 return
-            self._last = text
+            late = bool(self.slow_parts) and time.monotonic() < self._slow_due
+            self._last = "" if late else text
             if len(text) > MAX_FRAME_BYTES:
                 widget.notice = (
                     f"What there is to see now is too large to draw ({len(text) // 1024} KiB), so "
                     "this is older. In a cell, the view's words() has all of it."
                 )
                 return
-            with widget.hold_sync():
-                widget.frame, widget.words, widget.notice = frame, words, ""
+            fixed = {name: frame.pop(name) for name in self.fixed_parts}
+            slow = {name: frame.pop(name) for name in self.slow_parts}
+            with widget.hold_sync():  # of what is set here, only what has changed is sent
+                widget.frame, widget.fixed, widget.notice = frame, fixed, ""
+                if not late:
+                    widget.slow, widget.words = slow, words
+                    self._slow_due = time.monotonic() + SLOW_PERIOD_S
                 widget.number += 1
 
     def _on_close(self, _change: Any) -> None:
@@ -229,6 +236,7 @@ class LiveView(ABC):
             self._widget.send({"here": True})
         else:
             self.handle_control(message)
+            self._slow_due = 0.0
 
 
 def _has_front_end() -> bool:
@@ -236,18 +244,3 @@ def _has_front_end() -> bool:
     from IPython.core.getipython import get_ipython
 
     return hasattr(get_ipython(), "kernel")
-
-
-@cache
-def _widget_class(parts: tuple[str, ...]) -> type[LiveWidget]:
-    """Return the widget class of a view: its script and style are of the class, as anywidget's are.
-
-    Script and style are one text each: a browser cannot import the shared parts from beside it.
-    """
-    names = ("live", *parts)
-    texts = {
-        f"_{key}": "\n".join((_STATIC / f"{name}.{kind}").read_text("utf-8") for name in names)
-        for key, kind in (("esm", "js"), ("css", "css"))
-    }
-    name = f"{parts[-1].title()}Widget"
-    return type(name, (LiveWidget,), {**texts, "_anywidget_id": f"{__name__}.{name}"})

@@ -11,6 +11,7 @@ const DEAD =
   "Not live any more: the kernel of this notebook was restarted or has ended. " +
   "Run this cell again.";
 const ENDINGS = ["terminating", "restarting", "autorestarting", "dead"]; // of a kernel
+const CONFIRM_MS = 200; // between two confirmations: each makes the kernel say "busy" and "idle"
 const FOCUSABLE = "a, button, input, select, summary, textarea, [tabindex]";
 
 /** An id that nothing else on the page has: each view is a module of its own, with its own counters. */
@@ -73,12 +74,16 @@ function render({ model, el }) {
   const drawing = view.start(stage, send);
 
   let waiting = 0;
+  let confirmed = -CONFIRM_MS;
   const draw = () => {
     waiting = 0;
     // None yet, if the first look failed or was too large to send: the status line says why.
-    if (Object.keys(model.get("frame")).length) drawing.draw(model.get("frame"));
+    const frame = model.get("frame");
+    if (Object.keys(frame).length) drawing.draw({ ...model.get("fixed"), ...model.get("slow"), ...frame });
     retell();
     guard(root);
+    if (performance.now() - confirmed < CONFIRM_MS) return;
+    confirmed = performance.now();
     send({ drawn: model.get("number") });
   };
   // Text that somebody has marked, to copy it, stands still until it is let go of.

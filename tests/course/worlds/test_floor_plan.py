@@ -48,20 +48,21 @@ def test_an_unknown_name_and_an_unknown_path_say_what_there_is(tmp_path: Path):
          "size, start, charger, stations, walls, shelves, people, slip: rename or delete it. Did "
          "you mean 'shelves'?"),
         (SOUND + "people:\n  - {path: [[1, 1], [2, 2]], sped: 1}\n", "mine.yaml, field people 1 "
-         "speed: it is missing: add it (and 1 more)."),
+         "sped: there is no such field; there are path, speed, radius: rename or delete it (and 1 "
+         "more). Did you mean 'speed'?"),
         (SOUND + "people:\n  - {path: [[1, 1], [2, 2]], speed: 1, hat: red}\n", "mine.yaml, field "
          "people 1 hat: there is no such field; there are path, speed, radius: rename or delete "
          "it."),
         (SOUND + "people:\n  - {path: [[1, 1], [2, 2]], speed: fast}\n", "mine.yaml, field people "
          "1 speed: it must be a valid number, unable to parse string as a number, not 'fast': "
          "correct it."),
-        (SOUND + "people:\n  - {path: [[1, 1], [12, 2]], speed: 1}\n", "mine.yaml: field people 1 "
+        (SOUND + "people:\n  - {path: [[1, 1], [12, 2]], speed: 1}\n", "mine.yaml, field people 1 "
          "path: (12, 2) is not on the floor, which goes from (0, 0) to (10, 8): move it."),
-        (SOUND + "shelves: [[1.5, 1.5, 1, 1]]\n", "mine.yaml: field start: the robot has a radius "
+        (SOUND + "shelves: [[1.5, 1.5, 1, 1]]\n", "mine.yaml, field start: the robot has a radius "
          "of 0.2 m, and something is 0.00 m from its middle: move one of them."),
-        (SOUND + "shelves: [[5, 5, -1, 1]]\n", "mine.yaml: field shelves 1: width and height must "
+        (SOUND + "shelves: [[5, 5, -1, 1]]\n", "mine.yaml, field shelves 1: width and height must "
          "be above 0, not -1 and 1: x and y are its lower left corner."),
-        (SOUND + "stations:\n- {name: a, x: 1, y: 1}\n- {name: a, x: 2, y: 1}\n", "mine.yaml: "
+        (SOUND + "stations:\n- {name: a, x: 1, y: 1}\n- {name: a, x: 2, y: 1}\n", "mine.yaml, "
          "field stations 2 name: 'a' is there already: give each its own name."),
         (SOUND.replace("hall", "My Hall"), "mine.yaml, field name: 'My Hall' is no name of a node: "
          "write lower-case letters, digits and _."),

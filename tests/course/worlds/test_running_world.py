@@ -204,6 +204,15 @@ def test_reset_is_a_service_and_stamps_go_on(lab):
     assert [seconds(m) for m in scans.messages[-2:]] == pytest.approx([1.1, 1.2])
 
 
+def test_a_world_that_is_made_later_begins_then(lab):
+    lab.sim.advance(2.0)
+    world = lab.world()
+    scans = lab.record("scan", LaserScan)
+    lab.sim.advance(0.3)
+    assert world.time_s == pytest.approx(0.3)
+    assert [seconds(m) for m in scans.messages] == pytest.approx([2.1, 2.2, 2.3])
+
+
 def test_a_paused_world_stands_still_while_the_clock_goes_on(lab):
     world = lab.world()
     lab.sim.advance(0.5)
