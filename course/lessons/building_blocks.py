@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -20,6 +19,7 @@ from course.lessons.checkpoint import (
     say_not_yet,
     say_yes,
 )
+from course.lessons.spiral import spiral_is_driven as spiral_is_driven
 from course.runtime.core_session import CoreSession
 from course.runtime.requests.actions import GoalRun, GoalState
 from course.runtime.requests.recorder import Recorder
@@ -30,25 +30,17 @@ MOVED_M = 0.02
 NEAREST_TOLERANCE_M = 0.3
 """How far two distances may differ: people walk, and the scans are not the same one."""
 
-ROUND_TRIP_DEG = (270.0, 540.0)
-"""How much four quarter circles may turn a robot that needs time to speed up and to brake."""
 
-SPIRAL_PATIENCE_S = 40.0
-"""Seconds for five of waiting and a drive of about nine, on a busy machine."""
-
-
-def robot_drives(world: Any) -> Checkpoint:
-    """Say whether the robot moves from where it is now; `world` is what `course.world` returned."""
-    robot = world.simulation.describe_moment()["robot"]
-    start = (robot["x"], robot["y"])
+def robot_drives(session: CoreSession, track: Recorder) -> Checkpoint:
+    """Say whether the robot has moved since `track`, a recording of its odometry, began."""
 
     def look() -> Checkpoint:
-        robot = world.simulation.describe_moment()["robot"]
-        if math.dist(start, (robot["x"], robot["y"])) > MOVED_M:
-            return say_yes("the robot drives. Each message is one order, so it soon stops again.")
+        places = [stamped.message.pose.pose.position for stamped in track.messages]
+        if places and math.dist(*((at.x, at.y) for at in (places[0], places[-1]))) > MOVED_M:
+            return say_yes("the robot drives. A message is one order, so it soon stops again.")
         return say_not_yet("the robot stands still. Its speed is 0.0: put 0.3 in its place.")
 
-    return keep_looking(world.session, look)
+    return keep_looking(session, look)
 
 
 def nearest_is_published(session: CoreSession) -> Checkpoint:
@@ -227,46 +219,3 @@ def client_made_two_rounds(session: CoreSession) -> Checkpoint:
         return say_not_yet(f"the client made {rounds} round in that time. Two take 10 s.")
 
     return keep_looking(session, look, 2 * PATIENCE_S)
-
-
-def spiral_is_driven(session: CoreSession, world: Any, track: Recorder) -> Checkpoint:
-    """Wait for ClientNode's first goal, and say whether the robot drove a spiral for it.
-
-    Args:
-        session: the session of the five nodes.
-        world: the robot's world.
-        track: a recording of the robot's odometry since before it moved.
-    """
-
-    def has_result() -> Checkpoint:
-        said = session.logs("client_node", last=None).messages
-        if any(text.startswith("Action result") for text in said):
-            return say_yes("the drive is over.")
-        return say_not_yet("ClientNode has no result yet. Look at its log.")
-
-    if not (found := keep_looking(session, has_result, SPIRAL_PATIENCE_S)).passed:
-        return found
-    turned = math.degrees(turning_of([stamped.message for stamped in track.messages]))
-    least, most = ROUND_TRIP_DEG
-    if not least <= turned <= most:
-        return say_not_yet(
-            f"the robot turned by {turned:.0f}° on its way; four quarter circles are 360°. It "
-            "turns with speed / radius."
-        )
-    if world.simulation.describe_moment()["robot"]["touching"]:
-        return say_not_yet("the robot has driven into something. Run the cell again.")
-    return say_yes(f"a spiral: the robot turned by {turned:.0f}° on its way.")
-
-
-def turning_of(track: Sequence[Any]) -> float:
-    """Return by how much a robot turned to the left over all, in rad.
-
-    Args:
-        track: nav_msgs/Odometry messages in order, less than half a turn from each to the next.
-    """
-    headings = [
-        2.0 * math.atan2(message.pose.pose.orientation.z, message.pose.pose.orientation.w)
-        for message in track
-    ]
-    steps = itertools.pairwise(headings)
-    return sum(math.remainder(later - earlier, 2.0 * math.pi) for earlier, later in steps)

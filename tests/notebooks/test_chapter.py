@@ -159,8 +159,9 @@ def test_no_more_than_250_words_stand_between_two_code_cells(
 def test_a_robot_and_a_node_come_before_the_first_idea(chapter: nbformat.NotebookNode) -> None:
     first = next(cell for cell in chapter.cells if cell.cell_type == "code")
     assert first.source.splitlines()[:2] == ["%load_ext course", "import course"]
-    assert first.source.splitlines()[-1] == "world"
-    assert "class Watcher(Node)" in first.source
+    assert first.source.splitlines()[-1] == 'course.world("warehouse")'
+    assert 'watcher.create_subscription(LaserScan, "scan"' in first.source
+    assert len(first.source.splitlines()) <= 12  # so that the robot is on the first screen
     assert count_words(stretches(chapter)[0]) < 80
 
 
@@ -195,9 +196,9 @@ def test_a_reader_meets_no_assert(chapter: nbformat.NotebookNode) -> None:
 def test_it_says_at_the_top_and_after_each_part_how_long_things_take(prose: str) -> None:
     parts = [int(minutes) for minutes in re.findall(r"^## \d\. .*\((\d+) minutes\)$", prose, re.M)]
     assert len(parts) == 7
-    assert "About three hours, in seven parts" in prose.partition("## 1.")[0]
+    assert "*Three hours\nin all;" in prose.partition("## 1.")[0]
     assert 160 <= sum(parts) <= 200
-    assert f"the first takes {parts[0]} minutes" in prose
+    assert f"part 1 takes {parts[0]} minutes" in prose
     for number, minutes in enumerate(parts[1:], start=1):
         announced = prose.partition(f"*That was part {number}.")[2].partition("*")[0]
         assert f"takes {minutes} minutes" in announced

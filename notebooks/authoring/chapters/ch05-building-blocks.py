@@ -13,9 +13,8 @@
 # %% [markdown]
 # # Chapter 5: Nodes, Topics, Services - The Building Blocks of ROS 2
 #
-# Run the next cell with **Shift+Enter**. Then drive: click on the floor and use the arrow keys.
-#
-# *About three hours, in seven parts that you can take one at a time; the first takes 20 minutes.*
+# Run the cell with **Shift+Enter**, click on the floor, and drive with the arrow keys. *Three hours
+# in all; part 1 takes 20 minutes.*
 
 # %% tags=["notebook-only"]
 # %load_ext course
@@ -23,23 +22,10 @@ import course
 from rclpy.node import Node
 from sensor_msgs.msg import LaserScan
 
-
-class Watcher(Node):
-    def __init__(self):
-        super().__init__("watcher")
-        self.nearest = None
-        self.create_subscription(LaserScan, "scan", self.look, 10)
-
-    def look(self, scan):
-        self.nearest = min(scan.ranges)
-
-
-session = course.session(threads=4)
-world = session.world("warehouse")
-watcher = session.run(Watcher)
-session.until(lambda: watcher.nearest, timeout=30.0, what="the first scan")
-print(f"The nearest thing that the robot sees is {watcher.nearest:.2f} m away.")
-world
+seen = {}
+watcher = course.run(Node, "watcher")
+watcher.create_subscription(LaserScan, "scan", lambda s: seen.update(nearest=min(s.ranges)), 10)
+course.world("warehouse")
 
 # %% [markdown]
 # ## 1. A robot, and a node that listens (20 minutes)
@@ -47,8 +33,8 @@ world
 # ### Introduction
 #
 # You have just run a robot and a **node**, `watcher`. The robot measures 360 distances, ten times a
-# second, and publishes them on a **topic**, `scan`; your node listens there. Both are real ROS 2,
-# on the same network protocol that a robot in a hall would use.
+# second, and publishes them on a **topic**, `scan`; your node listens there, and keeps the smallest
+# in `seen`. Both are real ROS 2, on the same network protocol that a robot in a hall would use.
 #
 # ROS 2 is the nervous system of a Physical AI system. A nervous system is made of a few kinds of
 # cell, neurons, synapses and pathways, and its rich behaviour comes from how these simple parts are
@@ -59,7 +45,8 @@ world
 # - **services** answer a request with a response, synchronously;
 # - **actions** run a long operation and report on it while it runs.
 #
-# Running a cell again is always safe: a node that is already there is replaced, never doubled.
+# The chapter has seven parts, which you can take one at a time. Running a cell again is always
+# safe: a node that is already there is replaced, never doubled.
 #
 # **Yours.** The robot listens, too: on `cmd_vel`, for a speed. Make it drive: put `0.3` in place of
 # `0.0`, and run the cell.
@@ -68,10 +55,15 @@ world
 from course.lessons import building_blocks as check
 from geometry_msgs.msg import Twist
 
+session = course.session()  # it runs your nodes in the background
+session.until(lambda: seen, timeout=30.0, what="the first scan")
+print(f"The nearest thing that the robot sees is {seen['nearest']:.2f} m away.")
+
+track = session.record("wheel/odometry", timeout=30.0)
 command = Twist()
 command.linear.x = 0.0  # YOURS: metres a second, straight ahead
 session.publish("cmd_vel", command)
-check.robot_drives(world)
+check.robot_drives(session, track)
 
 # %% [markdown]
 # ### Learning objectives
@@ -145,8 +137,8 @@ print(f"{image.width} x {image.height} pixels, {len(image.data)} bytes, frame {i
 # driver handles camera data and nothing else; the localization node estimates the position and
 # nothing else.
 #
-# **Yours.** `Watcher` keeps what it finds to itself. Let this node tell everybody: replace the
-# three dots by the line in the comment.
+# **Yours.** `watcher` keeps what it finds to itself. Let this node tell everybody: replace the
+# three dots by the line in the comment. Most nodes are a class of their own, as here.
 
 # %% tags=["notebook-only", "try"]
 from std_msgs.msg import Float32
@@ -278,10 +270,10 @@ request = QoSProfile(depth=10, reliability=requested)
 with course.Session() as bench:
     camera = bench.run(Node, "camera")
     display = bench.run(Node, "display")
-    seen = []
+    arrived_images = []
     images = camera.create_publisher(String, "images", offer)
-    display.create_subscription(String, "images", seen.append, request)
-    found = check.images_arrive(bench, images, seen)
+    display.create_subscription(String, "images", arrived_images.append, request)
+    found = check.images_arrive(bench, images, arrived_images)
     warnings = [row.message for row in bench.logs(level="WARN")]
 
 print("The log says:", *warnings or ["nothing"])
@@ -335,9 +327,9 @@ with course.Session() as bench:
         notices.publish(String(data=f"notice {number}"))
     late = bench.record("notices", String, qos=QoSProfile(depth=10, durability=wanted))
     bench.until(notices.get_subscription_count, timeout=30.0, what="the reader to be matched")
+    found = check.late_reader_remembers(bench, late)
     notices.publish(String(data="notice 6"))
     bench.until(lambda: "notice 6" in texts(late), timeout=30.0, what="the new notice")
-    found = check.late_reader_remembers(bench, late)
 
 print("The reader has:", texts(late))
 found
@@ -1413,14 +1405,20 @@ display(GridBox([hall.widget, system.graph().widget], layout=columns))
 # %% tags=["notebook-only", "try"]
 from math import pi
 
+from nav_msgs.msg import Odometry
+
 
 class DrivingActionNode(ActionNode):
     """Drive a quarter of a circle for each number of the sequence."""
 
     def __init__(self):
         super().__init__()
-        self.busy = False
+        self.busy, self.way = False, 0.0  # m that it has come
         self.wheels = self.create_publisher(Twist, "cmd_vel", 10)
+        self.create_subscription(Odometry, "wheel/odometry", self.measure, 10)
+
+    def measure(self, odometry):
+        self.way += odometry.twist.twist.linear.x / 20  # it comes 20 times a second
 
     def goal_callback(self, goal):
         return GoalResponse.REJECT if self.busy else super().goal_callback(goal)
@@ -1433,12 +1431,12 @@ class DrivingActionNode(ActionNode):
             self.busy = False
 
     def do_step(self, number):
-        speed, radius = 0.5, 0.4 * number  # m/s, m
+        speed, radius = 0.4, 0.25 * number  # m/s, m
         command = Twist()
         command.linear.x = speed
         command.angular.z = 0.0  # YOURS: radians a second
-        end = self.get_clock().now() + Duration(seconds=pi / 2 * radius / speed)
-        while self.get_clock().now() < end:
+        end = self.way + pi / 2 * radius
+        while self.way < end:
             self.wheels.publish(command)
             if self._stopping.wait(0.05):
                 return True
