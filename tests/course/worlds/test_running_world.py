@@ -47,7 +47,7 @@ def robot_of(world):
 def drive_around():
     """Return all scans and odometry of two seconds, as their messages print."""
     with course.Session(sim_time=True) as session:
-        world = session.world("warehouse", seed=5)
+        world = session.world("warehouse", seed=5).simulation
         scans, wheels = session.record("scan"), session.record("wheel/odometry")
         session.run(Driver)
         session.sim.advance(2.0)
@@ -63,7 +63,7 @@ def test_two_runs_on_simulated_time_are_the_same():
 
 
 def test_cmd_vel_drives_it_and_sensors_come_at_their_rates(lab):
-    world = lab.world()
+    world = lab.world().simulation
     kinds = {"scan": LaserScan, "imu/data": Imu, "wheel/odometry": Odometry,
              "battery_state": BatteryState, "camera/image": Image}  # fmt: skip
     heard = {topic: lab.record(topic, kind) for topic, kind in kinds.items()}
@@ -86,13 +86,13 @@ def test_cmd_vel_drives_it_and_sensors_come_at_their_rates(lab):
 
 
 def test_it_is_an_ordinary_node_that_another_world_takes_the_place_of(lab):
-    first = lab.world()
+    first = lab.world().simulation
     assert list(lab.nodes) == ["/warehouse"]
     assert {topic["name"]: topic["type"] for topic in first.topics}["/scan"] == (
         "sensor_msgs/msg/LaserScan"
     )
     assert not lab.diagnose()
-    second = lab.world("corridor")
+    second = lab.world("corridor").simulation
     assert list(lab.nodes) == ["/corridor"]
     assert (first.closed, second.closed) == (True, False)
     with pytest.raises(SessionError, match="This world has ended"):
@@ -109,7 +109,7 @@ def test_it_is_an_ordinary_node_that_another_world_takes_the_place_of(lab):
 
 def test_it_ends_with_its_session():
     with course.Session() as session:
-        world = session.world()
+        world = session.world().simulation
         assert not world.closed
     assert world.closed
     with pytest.raises(SessionError, match="closed"):
@@ -117,7 +117,7 @@ def test_it_ends_with_its_session():
 
 
 def test_what_nodes_plan_and_find_is_shown_and_topics_say_what_they_carry(lab):
-    world = lab.world()
+    world = lab.world().simulation
     path = Path(poses=[PoseStamped(pose=Pose(position=Point(x=1.0, y=2.0)))])
     lab.publish("plan", path)
     lab.publish("obstacles", PoseArray(poses=[Pose(position=Point(x=3.0, y=4.0))]))
@@ -132,7 +132,7 @@ def test_what_nodes_plan_and_find_is_shown_and_topics_say_what_they_carry(lab):
 
 
 def test_events_are_published_when_they_happen(lab):
-    world = lab.world()
+    world = lab.world().simulation
     stops, bumps = lab.record("emergency/stop", String), lab.record("bumper", Bool)
     jams = lab.record("hardware/jammed", Bool)
     world.press_stop()
@@ -152,7 +152,7 @@ def test_events_are_published_when_they_happen(lab):
 
 @pytest.mark.parametrize("state", ["works", "slow", "dead", "refuses"])
 def test_the_gripper_answers_as_its_fault_says(lab, state):
-    world = lab.world()
+    world = lab.world().simulation
     world.set_fault("gripper", state)
     client = lab.run(Node, "client").create_client(SetBool, "gripper/set")
     lab.until(client.service_is_ready)
@@ -166,7 +166,7 @@ def test_the_gripper_answers_as_its_fault_says(lab, state):
 
 
 def test_without_radio_nothing_comes_and_the_robot_stops(lab):
-    world = lab.world()
+    world = lab.world().simulation
     scans, stops = lab.record("scan", LaserScan), lab.record("emergency/stop", String)
     lab.run(Driver)
     lab.sim.advance(1.0)
@@ -185,7 +185,7 @@ def test_without_radio_nothing_comes_and_the_robot_stops(lab):
 
 
 def test_an_unplugged_camera_sends_nothing(lab):
-    world = lab.world()
+    world = lab.world().simulation
     pictures = lab.record("camera/image", Image)
     world.set_fault("camera", "unplugged")
     lab.sim.advance(0.5)
@@ -193,7 +193,7 @@ def test_an_unplugged_camera_sends_nothing(lab):
 
 
 def test_reset_is_a_service_and_stamps_go_on(lab):
-    world = lab.world()
+    world = lab.world().simulation
     scans = lab.record("scan", LaserScan)
     lab.run(Driver)
     lab.sim.advance(1.0)
@@ -206,7 +206,7 @@ def test_reset_is_a_service_and_stamps_go_on(lab):
 
 def test_a_world_that_is_made_later_begins_then(lab):
     lab.sim.advance(2.0)
-    world = lab.world()
+    world = lab.world().simulation
     scans = lab.record("scan", LaserScan)
     lab.sim.advance(0.3)
     assert world.time_s == pytest.approx(0.3)
@@ -214,7 +214,7 @@ def test_a_world_that_is_made_later_begins_then(lab):
 
 
 def test_a_paused_world_stands_still_while_the_clock_goes_on(lab):
-    world = lab.world()
+    world = lab.world().simulation
     lab.sim.advance(0.5)
     world.pause()
     lab.sim.advance(1.0)
@@ -228,7 +228,7 @@ def test_a_paused_world_stands_still_while_the_clock_goes_on(lab):
 
 def test_on_wall_time_a_callback_that_blocks_does_not_stop_it():
     with course.Session() as session:
-        world = session.world()
+        world = session.world().simulation
         blocked, free = threading.Event(), threading.Event()
 
         class Blocking(Node):
@@ -267,7 +267,7 @@ def test_nobody_hears_from_a_world_whose_node_is_paused(lab):
 
 def test_there_is_one_for_the_notebooks_own_session():
     try:
-        assert course.world("warehouse", seed=1).describe_floor()["name"] == "warehouse"
+        assert course.world("warehouse", seed=1).simulation.describe_floor()["name"] == "warehouse"
         assert "/warehouse" in course.session().nodes
     finally:
         course.close()
