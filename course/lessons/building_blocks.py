@@ -135,6 +135,11 @@ def guess_holds(guess: Any, seen: int, things: str) -> Checkpoint:
     return say_not_yet(f"you said {guess!r}. It is another number of {things}: look again.")
 
 
+def diagram_is_counted(guess: Any) -> Checkpoint:
+    """Say whether this is the number of nodes in the chapter's diagram."""
+    return guess_holds(guess, 7, "nodes in the diagram")
+
+
 def emergency_is_noted(session: CoreSession, text: Any) -> Checkpoint:
     """Publish a text on /emergency/stop, and say whether ProcessingNode notes it as critical."""
     if text is ...:

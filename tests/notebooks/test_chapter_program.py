@@ -209,6 +209,6 @@ def test_the_whole_notebook_also_runs_as_a_script(notebook: Path) -> None:
         running.domain()
         code, output = running.stop(signal.SIGTERM)
         assert code == 0
-        assert "Left on the graph: nothing" in output
+        assert "Leaked: nothing" in output  # of the finale, which comes after main
         assert "Traceback" not in output
         assert running.errors.read_text() == ""
