@@ -234,70 +234,7 @@ check.logger_hears(session, logger, topic)
 # ### Quality of Service (QoS) profiles
 #
 # Not every topic needs the same treatment, so each end of a topic has a **QoS profile**: it says
-# how the topic behaves. Three policies matter most: reliability, durability and history.
-#
-# #### QoS profiles: reliability
-#
-# Must messages be delivered (`RELIABLE`), or is some loss acceptable (`BEST_EFFORT`)?
-# Safety-critical data should use `RELIABLE`; for sensor data `BEST_EFFORT` is often the better
-# choice.
-#
-# <details><summary>More: what RELIABLE does not promise</summary>
-#
-# `RELIABLE` means that a lost message is sent again *while the publisher still has it in its
-# history*. It is not "every message, always": a reader that is slower than the publisher still
-# loses what its queue cannot hold. Source: DDS 1.4, sections 2.2.3.14 RELIABILITY and 2.2.3.18
-# HISTORY.
-#
-# </details>
-#
-# #### Experiment 2: two ends that do not fit
-#
-# A publisher **offers** a QoS, a subscriber **requests** one. If the offer is weaker than the
-# request, DDS does not connect the two. There is no exception and no crash; nothing arrives.
-#
-# A camera offers `BEST_EFFORT`, and this display asks for more. **Yours:** make it see the five
-# images.
-
-# %% tags=["notebook-only", "try"]
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from std_msgs.msg import String
-
-requested = ReliabilityPolicy.RELIABLE  # YOURS
-offer = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
-request = QoSProfile(depth=10, reliability=requested)
-
-with course.Session() as bench:
-    camera = bench.run(Node, "camera")
-    display = bench.run(Node, "display")
-    arrived_images = []
-    images = camera.create_publisher(String, "images", offer)
-    display.create_subscription(String, "images", arrived_images.append, request)
-    found = check.images_arrive(bench, images, arrived_images)
-    warnings = [row.message for row in bench.logs(level="WARN")]
-
-print("The log says:", *warnings or ["nothing"])
-found
-
-# %% [markdown]
-# As it was, *one* subscription was on the graph and *none* was matched, and the only trace is a
-# warning in the log. When "my subscriber gets nothing" on a robot, compare the two QoS profiles
-# first; `session.diagnose()` does it for you. These pairs do not connect:
-#
-# | Offered | Requested |
-# | --- | --- |
-# | `BEST_EFFORT` | `RELIABLE` |
-# | `VOLATILE` | `TRANSIENT_LOCAL` |
-#
-# The other way round is fine: an offer may be *better* than the request. History and depth never
-# keep two ends apart.
-#
-# <details><summary>Source</summary>
-#
-# ROS 2 documentation, "Quality of Service settings", QoS compatibilities. (Deadline and liveliness
-# can keep two ends apart as well; they are beyond this chapter.)
-#
-# </details>
+# how the topic behaves. Three policies matter most: durability, reliability and history.
 #
 # #### QoS profiles: durability
 #
@@ -311,6 +248,9 @@ found
 # reader joins, and the sixth is posted. **Yours:** let the reader have the old ones, too.
 
 # %% tags=["notebook-only", "try"]
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import String
+
 wanted = DurabilityPolicy.VOLATILE  # YOURS
 
 
@@ -346,6 +286,66 @@ found
 # written through services. Transient-local topics are used for things like a map or a robot's
 # description, which are published once and needed by whoever comes later. Source: ROS 2
 # documentation, "Parameters" and "Quality of Service settings".
+#
+# </details>
+#
+# #### QoS profiles: reliability
+#
+# Must messages be delivered (`RELIABLE`), or is some loss acceptable (`BEST_EFFORT`)?
+# Safety-critical data should use `RELIABLE`; for sensor data `BEST_EFFORT` is often the better
+# choice.
+#
+# <details><summary>More: what RELIABLE does not promise</summary>
+#
+# `RELIABLE` means that a lost message is sent again *while the publisher still has it in its
+# history*. It is not "every message, always": a reader that is slower than the publisher still
+# loses what its queue cannot hold. Source: DDS 1.4, sections 2.2.3.14 RELIABILITY and 2.2.3.18
+# HISTORY.
+#
+# </details>
+#
+# #### Experiment 2: two ends that do not fit
+#
+# A publisher **offers** a QoS, a subscriber **requests** one. If the offer is weaker than the
+# request, DDS does not connect the two. There is no exception and no crash; nothing arrives.
+#
+# A camera offers `BEST_EFFORT`, and this display asks for more. **Yours:** make it see the five
+# images.
+
+# %% tags=["notebook-only", "try"]
+requested = ReliabilityPolicy.RELIABLE  # YOURS
+offer = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+request = QoSProfile(depth=10, reliability=requested)
+
+with course.Session() as bench:
+    camera = bench.run(Node, "camera")
+    display = bench.run(Node, "display")
+    arrived_images = []
+    images = camera.create_publisher(String, "images", offer)
+    display.create_subscription(String, "images", arrived_images.append, request)
+    found = check.images_arrive(bench, images, arrived_images)
+    warnings = [row.message for row in bench.logs(level="WARN")]
+
+print("The log says:", *warnings or ["nothing"])
+found
+
+# %% [markdown]
+# As it was, *one* subscription was on the graph and *none* was matched, and the only trace is a
+# warning in the log. When "my subscriber gets nothing" on a robot, compare the two QoS profiles
+# first; `session.diagnose()` does it for you. These pairs do not connect:
+#
+# | Offered | Requested |
+# | --- | --- |
+# | `BEST_EFFORT` | `RELIABLE` |
+# | `VOLATILE` | `TRANSIENT_LOCAL` |
+#
+# The other way round is fine: an offer may be *better* than the request. History and depth never
+# keep two ends apart.
+#
+# <details><summary>Source</summary>
+#
+# ROS 2 documentation, "Quality of Service settings", QoS compatibilities. (Deadline and liveliness
+# can keep two ends apart as well; they are beyond this chapter.)
 #
 # </details>
 #
