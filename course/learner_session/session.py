@@ -43,7 +43,7 @@ class Session(CoreSession):
         clock, and ends with the session, or when you ask for a world again.
 
         Args:
-            name: "warehouse", "corridor", or the path of a floor plan of your own (YAML).
+            name: "warehouse", "corridor", "hall", or the path of a floor plan of your own (YAML).
             seed: decides on the noise of the sensors: the same seed makes the same noise.
 
         Raises:
