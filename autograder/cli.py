@@ -492,7 +492,7 @@ def main() -> None:
     except OSError as error:
         where = f" ({error.filename})" if error.filename else ""
         err.print(
-            f"autograder: {error.strerror or error}{where}: make room or choose another folder, "
+            f"autograder: {error.strerror or error}{where}: make room there or choose another folder, "
             "then run the same command again; what was graded so far is kept.",
             soft_wrap=True,
         )  # fmt: skip

@@ -13,11 +13,42 @@
 # %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-task", "locked": true, "schema_version": 3, "solution": false}
 # # Exercise 2: Node architecture
 #
-# The delivery robot gets a waypoint and drives there, around whatever stands in its way. You decide
-# **which nodes** it has, **what connects them**, and **by which pattern**: topic, service or action.
-# You declare the design; the library brings it up as real ROS 2 nodes and draws it.
+# ![A robot drives to a waypoint around a shelf; above it six jobs are joined by arrows, from the sensors to the motors.](architecture.svg)
 #
-# Only the robot's boundary is fixed:
+# The delivery robot gets a waypoint and drives there, around whatever stands in its way. **You**
+# decide which nodes it has and what connects them: topic, service or action. You declare the design,
+# and the course brings it up as real ROS 2 nodes. This takes about 60 minutes.
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-must-do", "locked": true, "schema_version": 3, "solution": false}
+# ## What it must do
+#
+# - **Drivers** publish `scan`, `camera/image` and `wheel/odometry`.
+# - **State estimation** reads a sensor and publishes the robot's pose.
+# - **Obstacle detection** reads `scan` or `camera/image` and publishes what is in the way. That
+#   reaches the motors as a stream: nobody has to ask for it.
+# - **Path planning** is a service. Its node knows the `map`, and a node that has the goal calls it.
+# - **Navigation** is the server of the action `navigate_to`, and topics tell it what the sensors see.
+# - **Control**: exactly one node publishes `motors/command`, and navigation leads to it.
+#
+# A node does at most **two** of these six jobs; further nodes are welcome. And nothing dangles: each
+# topic has a writer and a reader, each service and action a server, and QoS fits.
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-try-it", "locked": true, "schema_version": 3, "solution": false}
+# ## Try it
+#
+# Once the cells below have run, bring your design up in a cell of your own:
+#
+# ```python
+# design.run()                     # its nodes, as the examiner sees them
+# course.session().graph()         # drawn from the ROS graph; what is not connected is red
+# course.session().diagnose()      # what is wrong with it, in words
+# ```
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-fine-print", "locked": true, "schema_version": 3, "solution": false}
+# <details><summary>What exactly is examined</summary>
+#
+# Another process brings the design up and reads the ROS graph. Nobody reads your code, and inside the
+# robot nodes, topics and services may be called anything. Only its boundary is fixed:
 #
 # | Name | Type | What it is |
 # |---|---|---|
@@ -28,55 +59,81 @@
 # | `navigate_to` | action, `NavigateTo` below or any other that is installed | a person sends a waypoint, follows the progress, may cancel |
 # | `motors/command` | topic, `geometry_msgs/Twist` | the motors' electronics carries it out |
 #
-# Six jobs have to be done:
+# **The design comes up** (no points; all else needs it): each node that `design` declares is on the
+# graph, and so are all its endpoints when its constructor has returned.
 #
-# 1. **Drivers** publish the readings of all three sensors.
-# 2. **State estimation** reads one sensor or more (an IMU that you add is one, too), or is the driver
-#    of one, and publishes the robot's pose: as `Odometry` or one of the Pose types (`Pose`,
-#    `PoseStamped`, `PoseWithCovariance`, `PoseWithCovarianceStamped`), on a topic other than
-#    `wheel/odometry`. The navigation node does not do this.
-# 3. **Obstacle detection** reads `scan` or `camera/image` and publishes obstacle information: of
-#    another type than a reading (so no `LaserScan` and no `Image`), not a velocity, a pose, a path
-#    or diagnostics, able to say where or how far (a `Bool`, a time, a colour or a bare `Header` is
-#    not), and with room for a 32-bit number or a text (a `UInt16` has none). Another node reads it.
-#    Navigation and control do not do the detection.
-# 4. **Path planning** is a service. Its node knows the map: it reads it, or is the one that hands it
-#    out. Another node, which has the goal, calls it, and the request (or a topic) brings the goal.
-# 5. **Navigation** is the server of the action `navigate_to` and accepts its goals: whenever one is
-#    over, the next. Topics bring it what the sensors see: readings, obstacle information, or the
-#    pose.
-# 6. **Control**: exactly one node publishes `motors/command`. From the navigation node links lead to
-#    it: topics, services or action goals, whichever you like.
+# **Drivers** (1 point): each of the three sensors' topics has a publisher of its type.
 #
-# And four rules for the whole:
+# **Navigation** (2 points)
 #
-# - A node takes on at most **two** of the six jobs. Any further nodes are welcome.
-# - What obstacle detection finds reaches the motors **as a stream**: over topics or action goals,
-#    without anybody having to ask a service for it.
-# - **Nothing dangles**: every topic has a writer and a reader, whoever calls a service or sends
-#   goals finds one server, and the QoS of the two sides fits, that of services, too. Every node has
-#   a name of its own. Only `motors/command` is read, and `navigate_to` used, by someone outside
-#   your design.
-# - Use message types that are installed (`std_msgs`, `geometry_msgs`, `sensor_msgs`, `nav_msgs`,
-#   `diagnostic_msgs`, …).
+# - Exactly one node is the server of `navigate_to`.
+# - A topic brings it what the sensors see: a reading, obstacle information or the pose; one of them
+#   is enough. A topic that can say only that somebody is there (a `Bool`, an `Empty`) is not.
 #
-# Your design is examined as it comes up on the ROS graph. At the end dye is poured in: a marked
-# goal and a marked scan (a marked image, if the node that detects obstacles does not read the scan),
-# which each node of the design passes on along its links. Both marks must reach `motors/command`.
-# The nodes that the library makes do that by themselves. A node that you write yourself passes a
-# mark on by copying the header of what it received, or with `course.design.carry(received, sent)`,
-# just before it sends. A mark stands in a message's `frame_id` or, where there is none, in its text
-# or its numbers, so turn no message away because of these. While scans are poured in, a goal is
-# under way; before another goal is sent, the one before is cancelled.
+# **Obstacle detection** (2 points)
 #
-# So that this can be seen from outside, nodes that you write yourself keep to the following. All
-# endpoints are there when the constructor returns. A node works on each message that comes in, or
-# at least twice a second on the newest, also if nothing has changed. While the wheels report, the
-# pose is published. A goal gets to the motors within two seconds. And a further node that one of
-# yours makes for itself counts as one more node: what the two hand each other in Python is no link.
+# - A node that reads `scan` or `camera/image` publishes obstacle information, another node reads
+#   that, and from there links lead to the motors.
+# - Types that fit are `PointCloud2`, `PoseArray`, `PointStamped`, `PolygonStamped`, `OccupancyGrid`,
+#   `Range`, `Float32`, `Float32MultiArray`, `String` and most others. Not these: a reading again
+#   (`LaserScan`, `Image`, `CompressedImage`, `CameraInfo`, `Imu`, `Odometry`), one robot's pose
+#   (`Pose`, `PoseStamped`, `PoseWithCovariance`, `PoseWithCovarianceStamped`), a velocity (the four
+#   `Twist` types), a `Path`, a `DiagnosticArray`; nor `Bool`, `Empty`, `Header`, `ColorRGBA`, `Time`
+#   and `Duration`, which cannot say where. It needs a number of 32 bits or more, or a text, as its
+#   way is followed at the end; so `UInt16` and smaller do not do. The type is an installed one.
+# - The node of navigation and that of the motors may read the sensors, too, as a collision monitor
+#   does. But that is no detection: another node does it.
 #
-# **20 points:** 10 for the visible checks, 5 for checks that run when your work is graded, 5 for
-# your explanations.
+# **State estimation** (1 point)
+#
+# - A node that reads a sensor, or is the driver of one, publishes the pose: as `Odometry` or one of
+#   the four Pose types above, on a topic other than `wheel/odometry`. Another sensor than the three
+#   (an IMU) is one as well. Navigation's node does not do it.
+# - If that node reads nothing but odometry, scans and the map, a pose comes while the wheels report.
+#
+# **Path planning** (1 point)
+#
+# - A node that knows the map (it reads it, asks for it, or hands it out) serves planning. A service
+#   that hands out or loads the map is another one.
+# - Another node calls it, one that the goal can get to from `navigate_to`. The goal comes with the
+#   request, which then has a number or a text in it, or over topics.
+#
+# **Control** (2 points): one node, and no other, publishes `motors/command`, as `Twist`. From
+# navigation topics, services or goals lead to it. Navigation and control may be one node: these are
+# two jobs.
+#
+# **Links** (1 point)
+#
+# - Every topic has a writer and a reader, and at least one leads from one node to another; whoever
+#   calls a service or sends goals finds one server; and the QoS of both sides fits, that of services,
+#   too. Only `motors/command` is read, and `navigate_to` used, by somebody outside.
+# - Each node has a full name of its own: `/front/driver` beside `/rear/driver` is right.
+#
+# **At grading** (5 points)
+#
+# - From obstacle information to `motors/command` there is a way of topics and action goals alone (1).
+# - No node does more than two of the six jobs. Where several publish what looks like a pose or like
+#   obstacles, that job counts for the one that has the least else to do (1).
+# - A goal that is sent to `navigate_to` comes out at `motors/command`, the next is taken when the one
+#   before is over or cancelled, and planning answers (1).
+# - A scan comes out in obstacle information, and what is published there comes out at the motors,
+#   on a topic that their node reads or with goals (an image, if the detection reads no scan). What
+#   comes up meanwhile keeps to the same rules (2).
+#
+# For the last two, dye is poured in: messages and goals that bear a mark, in a `frame_id`, a text or a
+# number. Eight are sent one after the other, and two that arrive are enough. A mark has 1 s; of the
+# eight goals the last three have 4 s. The nodes that the library makes pass marks on by themselves.
+# **Only for nodes that you write yourself**:
+#
+# - Pass a mark on by copying the header of what you received, or with
+#   `course.design.carry(received, sent)` just before you send.
+# - Turn no message away because of its `frame_id`, a text or its numbers.
+# - Work on each message that comes in, or at least twice a second on the newest, also if nothing has
+#   changed. A driver of your own may go on publishing: a marked reading comes right after its own.
+# - A node that yours makes for itself counts as one more node, and what two nodes hand each other in
+#   Python is no link.
+#
+# </details>
 
 # %% nbgrader={"grade": false, "grade_id": "architecture-given", "locked": true, "schema_version": 3, "solution": false}
 # %load_ext course
@@ -142,7 +199,8 @@ except InterfaceError:  # no compiler here: an installed action stands in
 # ## Your design
 #
 # The cell below runs as it is: one driver that nobody listens to. Make it a robot. Keep the name
-# `design`.
+# `design`. The drawing below it has round shapes for nodes, boxes for topics, hexagons for services,
+# and framed boxes for actions.
 
 # %% nbgrader={"grade": false, "grade_id": "architecture-solution", "locked": false, "schema_version": 3, "solution": true}
 design = course.Design(outside=['motors/command', 'navigate_to'])
@@ -186,15 +244,10 @@ design
 # %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-how-to-check", "locked": true, "schema_version": 3, "solution": false}
 # ## Check it yourself
 #
-# Above, round shapes are nodes, boxes topics, hexagons services, and framed boxes actions.
-#
-# The next cell starts an examiner in a process of its own, which brings the design up and reads the
-# ROS graph. For each check it says what was observed, what was needed, and why it matters on a
-# robot. Ask for more help with `check("architecture", hint=2)` or `hint=3` in a cell of your own.
-#
-# **Look inside**, in cells of your own after `import course`: `design.run()`, and then
-# `course.session().graph()` draws the nodes as they really came up, with what is not connected in
-# red; `course.session().diagnose()` says in words what is wrong with it.
+# The next cell starts an examiner in a process of its own, for some seconds. It says for each check
+# what was observed, what was needed, and why that matters on a robot; `check("architecture", hint=2)`
+# in a cell of your own helps more, `hint=3` most. There are 20 points: 10 for these checks, 5 at
+# grading, 5 for your two answers.
 
 # %% nbgrader={"grade": true, "grade_id": "architecture-visible", "locked": true, "points": 0, "schema_version": 3, "solution": false}
 from autograder import check
@@ -214,63 +267,36 @@ check("architecture", part="hidden")
 # %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-question-nodes", "locked": true, "schema_version": 3, "solution": false}
 # ## Explain your design
 #
-# Defend your design in two or three sentences each. An instructor reads this: each answer gives one
-# point, or half a point if only a part of the question is answered.
+# Two answers of two to four sentences each. An instructor reads them: 2.5 points each, and a part of
+# the question answered is a part of the points.
 #
-# ### Nodes
+# ### Nodes and patterns
 #
-# Why is the work divided where it is? Name one case in which that pays (a new sensor, a crash, a
-# test).
+# Why is the work divided where it is, and why is navigation an action but planning a service? Name
+# one case in which that pays: a new sensor, a crash, a test.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "architecture-explanation-nodes", "locked": false, "points": 0, "schema_version": 3, "solution": true}
 # ### BEGIN SOLUTION
-# Each sensor has a driver, so that a new LIDAR means one new node. State estimation and obstacle
-# detection turn readings into a pose and obstacles; both can be tested with recordings. Navigation
-# decides, the controller only turns its decision into wheel speeds, so that there is one place that
-# commands the motors.
-# ### END SOLUTION
-
-# %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-question-action", "locked": true, "schema_version": 3, "solution": false}
-# ### Action
-#
-# Why is navigation an action, and what would it lose as a service or as a topic?
-
-# %% [markdown] nbgrader={"grade": true, "grade_id": "architecture-explanation-action", "locked": false, "points": 0, "schema_version": 3, "solution": true}
-# ### BEGIN SOLUTION
-# Driving takes minutes: the person who sent the goal wants to see progress and to cancel. A service
-# would keep the caller waiting without a word; a topic would have no result.
-# ### END SOLUTION
-
-# %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-question-service", "locked": true, "schema_version": 3, "solution": false}
-# ### Service
-#
-# Why is planning a service, and what does the caller do while it waits?
-
-# %% [markdown] nbgrader={"grade": true, "grade_id": "architecture-explanation-service", "locked": false, "points": 0, "schema_version": 3, "solution": true}
-# ### BEGIN SOLUTION
-# A path is needed once a goal, or when the way is blocked: one question, one answer. Navigation
-# calls asynchronously and goes on reading obstacles meanwhile.
-# ### END SOLUTION
-
-# %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-question-topics", "locked": true, "schema_version": 3, "solution": false}
-# ### Topics
-#
-# How does obstacle information get to the motors, and why does nobody ask for it?
-
-# %% [markdown] nbgrader={"grade": true, "grade_id": "architecture-explanation-topics", "locked": false, "points": 0, "schema_version": 3, "solution": true}
-# ### BEGIN SOLUTION
-# Scans become obstacles ten times a second, and navigation slows down or turns with each of them.
-# If it had to ask, an obstacle would be as old as the last question.
+# Each sensor has a driver, so that a new LIDAR means one new node; detection can be tested with
+# recorded scans and restarted while the robot goes on; one controller alone commands the motors.
+# Driving takes minutes, so whoever sent the goal wants to see progress and to cancel: an action. A
+# path is needed once a goal, or when the way is blocked: one question, one answer, a service.
 # ### END SOLUTION
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-question-links", "locked": true, "schema_version": 3, "solution": false}
-# ### QoS or failure
+# ### When a part fails
 #
-# Name one link whose QoS you chose and say why, or say what the robot does when one of your nodes
-# is gone, and why that is safe.
+# Choose two of your nodes. What does the robot do when each of them is gone, how do the others notice
+# it, and why is that safe, or what would you add?
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "architecture-explanation-links", "locked": false, "points": 0, "schema_version": 3, "solution": true}
 # ### BEGIN SOLUTION
-# The map is transient local: it is published once, and a planner that restarts still gets it. Scans
-# are best effort, because the next one is better than a late one.
+# Without the LIDAR's driver no obstacles come. Navigation reads them ten times a second: after half a
+# second of silence it must stop and abort its goal, as no obstacle heard is not the same as none
+# there. Without the planner a call is not answered: navigation waits with a time-out and keeps to
+# the path that it has, or stops. If navigation itself dies, no velocity comes any more, and the
+# controller should stop the motors by itself after a time-out.
 # ### END SOLUTION
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-hand-in", "locked": true, "schema_version": 3, "solution": false}
+# **Hand in**: save this notebook, and hand in the file `architecture.ipynb` in the way of your course.
