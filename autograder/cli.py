@@ -492,8 +492,8 @@ def main() -> None:
     except OSError as error:
         where = f" ({error.filename})" if error.filename else ""
         err.print(
-            f"autograder: {error.strerror or error}{where}: make room there or choose another folder, "
-            "then run the same command again; what was graded so far is kept.",
+            f"autograder: {error.strerror or error}{where}: make room there or choose another "
+            "folder, then run the same command again; what was graded so far is kept.",
             soft_wrap=True,
         )  # fmt: skip
         sys.exit(1)
