@@ -89,8 +89,19 @@ class Check(Generic[RigT]):
     rationale: str
     run: Callable[[RigT], str | None]
     needs: tuple[str, ...]
+    builds_on: tuple[str, ...]
     hints: tuple[str, ...]
     read: str
+
+    @property
+    def rests_on(self) -> tuple[str, ...]:
+        """The checks that are made before this one: those that it needs, or builds on."""
+        return (*self.needs, *self.builds_on)
+
+    @property
+    def is_root(self) -> bool:
+        """Whether it is made whatever else has failed."""
+        return not self.rests_on
 
 
 @dataclass
@@ -113,16 +124,26 @@ class Exam(Generic[RigT]):
     """What a check context that ends leaves up: it would be taken down if nobody referred to it."""
 
     def check(
-        self, *, needs: Sequence[str] = (), hints: Sequence[str] = (), read: str = ""
+        self,
+        *,
+        needs: Sequence[str] = (),
+        builds_on: Sequence[str] = (),
+        hints: Sequence[str] = (),
+        read: str = "",
     ) -> Callable[[Callable[[RigT], str | None]], Callable[[RigT], str | None]]:
         """Register a check under its function's name.
 
         Args:
-            needs: checks that must have passed before this one makes sense.
+            needs: checks without which this one can show nothing: it is not made if one of them
+                has not passed. So it is where what it looks for would be right of a node that does
+                nothing at all.
+            builds_on: checks whose mistake may make this one fail, too. It is made all the same,
+                and what is right counts. Where it fails and one of them has not passed, it counts
+                as not checked: one mistake is told once.
             hints: from a nudge to nearly the answer; shown one by one.
             read: where to read on (a section of the chapter, a page of the ROS 2 docs).
         """
-        unknown = [name for name in needs if name not in self.checks]
+        unknown = [name for name in (*needs, *builds_on) if name not in self.checks]
         if unknown:
             raise ExamError(f"Exam '{self.name}' has no check {unknown[0]!r} to depend on.")
 
@@ -130,7 +151,7 @@ class Exam(Generic[RigT]):
             title, _, rationale = inspect.cleandoc(run.__doc__ or run.__name__).partition("\n")
             self.checks[run.__name__] = Check(
                 run.__name__, title.strip(), " ".join(rationale.split()), run,
-                tuple(needs), tuple(hints), read or self.read,
+                tuple(needs), tuple(builds_on), tuple(hints), read or self.read,
             )  # fmt: skip
             return run
 
@@ -200,10 +221,8 @@ class Exam(Generic[RigT]):
                     try:
                         rig = stack.enter_context(self.rig(bench))
                     except (StudentError, SubjectGone) as error:
-                        roots = [name for name in self.checks if not self.checks[name].needs]
-                        done.update(
-                            (name, _student_failure(self.checks[name], error)) for name in roots
-                        )
+                        roots = [check for check in self.checks.values() if check.is_root]
+                        done.update((check.name, _student_failure(check, error)) for check in roots)
                         rig = None
                 table = self.part(part.name)
                 bench.key = part.key
@@ -222,7 +241,7 @@ class Exam(Generic[RigT]):
         self, result: CheckResult, done: dict[str, CheckResult], told: set[str]
     ) -> CheckResult:
         """Say why what a check needs failed, where no report so far says so."""
-        needs = [done[need] for need in self.checks[result.name].needs if need in done]
+        needs = [done[need] for need in self.checks[result.name].rests_on if need in done]
         hidden = [need for need in needs if need.status == "failed" and need.name not in told]
         if result.status != "not_checked" or not hidden:
             return result
@@ -239,9 +258,12 @@ class Exam(Generic[RigT]):
     ) -> CheckResult:
         if name not in done:
             check = self.checks[name]
-            for need in check.needs:
+            for need in check.rests_on:
                 self._examine_check(need, rig, bench, done, gone, deadline)
             missing = [done[need] for need in check.needs if not done[need].passed]
+            at_fault = [done[need] for need in check.builds_on if not done[need].passed]
+            if rig is None:
+                missing = missing or at_fault
             if missing:
                 done[name] = _not_checked(check, not_checked.needed_check(missing[0]))
             elif not deadline.seconds_left:
@@ -250,6 +272,8 @@ class Exam(Generic[RigT]):
                 assert rig is not None  # without one, what needs nothing has failed already
                 bench.steps.clear()
                 result = _run_check(check, rig, gone)
+                if result.status == "failed" and at_fault:
+                    result = _not_checked(check, not_checked.needed_check(at_fault[0]))
                 done[name] = replace(result, steps=tuple(bench.steps))
         return done[name]
 

@@ -71,7 +71,7 @@ def scans_are_analysed(node: ObservedNode) -> None:
 
 
 @EXAM.check(
-    needs=("loop_beats", "inspections_are_reported"),
+    builds_on=("loop_beats", "inspections_are_reported"),
     hints=("How many threads wait for an answer?", "A callback that waits for one holds a thread."),
 )
 def slow_service_holds_nothing_up(node: ObservedNode) -> None:
@@ -87,7 +87,8 @@ def slow_service_holds_nothing_up(node: ObservedNode) -> None:
 
 
 @EXAM.check(
-    needs=("loop_beats", "scans_are_analysed"),
+    needs=("scans_are_analysed",),
+    builds_on=("loop_beats",),
     hints=("In which group is each callback?", "The timer needs a group of its own."),
     read=GROUPS,
 )
@@ -102,7 +103,7 @@ def slow_callback_holds_nothing_up(node: ObservedNode) -> None:
 
 
 @EXAM.check(
-    needs=("inspections_are_reported", "scans_are_analysed"),
+    builds_on=("inspections_are_reported", "scans_are_analysed"),
     hints=("What if another callback writes between your reading and your writing?",),
     read=GROUPS,
 )

@@ -44,7 +44,8 @@ def beats_count(node: ObservedNode) -> None:
 
 
 @EXAM.check(
-    needs=("beats_count",), hints=("When is it told?", "`add_post_set_parameters_callback`")
+    builds_on=("beats_count",),
+    hints=("When is it told?", "`add_post_set_parameters_callback`"),
 )
 def period_follows(node: ObservedNode) -> None:
     """A new rate holds within one old period, and no beat is lost or added on the way.
@@ -78,7 +79,7 @@ def rate_is_bounded(node: ObservedNode) -> None:
             node.set(RATE, bad).require_refused()
 
 
-@EXAM.check(needs=("beats_count",), hints=("`timer.cancel()`", "and then `timer.reset()`"))
+@EXAM.check(builds_on=("beats_count",), hints=("`timer.cancel()`", "and then `timer.reset()`"))
 def pauses_and_resumes(node: ObservedNode) -> None:
     """The service pauses the beats, also twice, and resumes them where the count was.
 
@@ -94,7 +95,7 @@ def pauses_and_resumes(node: ObservedNode) -> None:
     span.require_count(BEATS, first=last + 1)
 
 
-@EXAM.check(needs=("pauses_and_resumes", "period_follows"), hints=("Is a new timer paused?",))
+@EXAM.check(builds_on=("pauses_and_resumes", "period_follows"), hints=("Is a new timer paused?",))
 def stays_paused(node: ObservedNode) -> None:
     """A change of the rate does not end a pause; it holds from the resume on.
 
@@ -107,7 +108,7 @@ def stays_paused(node: ObservedNode) -> None:
     node.advance(5.0, "After it was resumed").require_rate(BEATS, hz=2.0)
 
 
-@EXAM.check(needs=("beats_count",), hints=("What of it still runs?",))
+@EXAM.check(needs=("node_starts",), builds_on=("beats_count",), hints=("What of it still runs?",))
 def ends_with_its_node(node: ObservedNode) -> None:
     """After `destroy_node` nothing of it is left, and nothing more comes.
 

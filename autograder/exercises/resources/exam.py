@@ -81,7 +81,7 @@ def driver_runs(rig: CameraRig) -> None:
 
 
 @EXAM.check(
-    needs=("driver_runs",),
+    builds_on=("driver_runs",),
     hints=(
         "Which method of rclpy's Node takes its publishers, subscriptions and services down?",
         "If you override destroy_node(), the inherited one is not called by itself.",
@@ -102,7 +102,7 @@ def endpoints_gone(rig: CameraRig) -> None:
 
 
 @EXAM.check(
-    needs=("driver_runs",),
+    builds_on=("driver_runs",),
     hints=(
         "Who closes the camera in your code, and when?",
         "rclpy destroys what it made: endpoints and timers. The camera is not one of them.",
@@ -125,7 +125,8 @@ def camera_given_back(rig: CameraRig) -> None:
 
 
 @EXAM.check(
-    needs=("endpoints_gone", "camera_given_back"),
+    needs=("camera_given_back",),
+    builds_on=("endpoints_gone",),
     hints=(
         "Write down what your constructor makes. What of it does destroy_node() not end?",
         "A thread that waits for ever in queue.get() never ends; a list of the class, or a "
@@ -147,7 +148,7 @@ def lives_are_flat(rig: CameraRig) -> None:
 
 
 @EXAM.check(
-    needs=("camera_given_back",),
+    builds_on=("camera_given_back",),
     hints=(
         "What has ended when destroy_node() returns for the first time, what does a second call "
         "find, and what the next driver? A session calls it, and a test, and a `finally:`.",
@@ -179,7 +180,7 @@ def cleanup_twice(rig: CameraRig) -> None:
 
 
 @EXAM.check(
-    needs=("endpoints_gone", "camera_given_back"),
+    builds_on=("endpoints_gone", "camera_given_back"),
     hints=(
         "Let each line of your constructor raise in your mind. What is open at that moment?",
         "The camera 'stuck' opens, but its stream does not start. Try CameraDriver('stuck') twice: "
@@ -240,7 +241,7 @@ def managed_runs(rig: CameraRig) -> None:
 
 
 @EXAM.check(
-    needs=("managed_runs",),
+    builds_on=("managed_runs",),
     hints=(
         "Between deactivate and activate: what does your node still do, and what does it hold?",
         "A lifecycle publisher drops what is published while it is inactive: you do not see a "
@@ -277,7 +278,7 @@ def silent_when_inactive(rig: CameraRig) -> None:
 
 
 @EXAM.check(
-    needs=("managed_runs",),
+    builds_on=("managed_runs",),
     hints=(
         "What does a round from configure to cleanup read, make, and give back? Does the next one "
         "begin as the first one did?",
@@ -308,7 +309,7 @@ def managed_gives_back(rig: CameraRig) -> None:
 
 
 @EXAM.check(
-    needs=("managed_gives_back",),
+    builds_on=("managed_gives_back",),
     hints=(
         "What does your on_configure return for a rate or a camera that it cannot have, and what "
         "has it opened by then?",
@@ -340,7 +341,7 @@ def configure_refused(rig: CameraRig) -> None:
 
 
 @EXAM.check(
-    needs=("managed_runs",),
+    builds_on=("managed_runs",),
     hints=(
         "Which of your methods runs after an exception in on_activate?",
         "on_error. The one that you inherit returns SUCCESS and gives nothing back.",
@@ -369,7 +370,7 @@ def activation_error(rig: CameraRig) -> None:
 
 
 @EXAM.check(
-    needs=("managed_gives_back",),
+    builds_on=("managed_gives_back",),
     hints=(
         "From which states can a node be shut down, or destroyed? Which of your methods runs then?",
         "on_shutdown, and neither on_deactivate nor on_cleanup before it.",
@@ -411,7 +412,7 @@ def managed_shutdown(rig: CameraRig) -> None:
 
 
 @EXAM.check(
-    needs=("driver_runs",),
+    builds_on=("driver_runs",),
     hints=(
         "What had your zoom callback already done when camera.zoom(99) raised?",
         "A lock that was acquired and not released stops whoever wants it next, in silence.",
@@ -439,7 +440,7 @@ def callback_raises(rig: CameraRig) -> None:
 
 
 @EXAM.check(
-    needs=("endpoints_gone", "camera_given_back"),
+    builds_on=("endpoints_gone", "camera_given_back"),
     hints=(
         "A callback waits for a picture, and destroy_node() runs in another thread. Who waits for "
         "whom, and for how many pictures?",

@@ -87,7 +87,7 @@ def gripper_answers(nodes: Nodes) -> None:
 
 
 @EXAM.check(
-    needs=("gripper_answers",),
+    builds_on=("gripper_answers",),
     hints=(
         "Any try may be refused: what does your node publish then, and what does it not do?",
         "A refusal is an answer: leave the loop of tries, and command the arm to hold.",
@@ -120,7 +120,7 @@ def gripper_refuses(nodes: Nodes) -> None:
 
 
 @EXAM.check(
-    needs=("gripper_answers",),
+    builds_on=("gripper_answers",),
     hints=(
         "Write down, second by second, what your node does when nobody answers: each try, each "
         "pause, the arm, the word. And what of it is still under way at the next request?",
@@ -183,7 +183,7 @@ def speed_serves(nodes: Nodes) -> None:
 
 
 @EXAM.check(
-    needs=("speed_serves",),
+    builds_on=("speed_serves",),
     hints=(
         "Take the request that is named above: which line of yours meets it first, and what has "
         "been changed by then?",
@@ -246,7 +246,7 @@ def goals_end(nodes: Nodes) -> None:
 
 
 @EXAM.check(
-    needs=("goals_end",),
+    builds_on=("goals_end",),
     hints=(
         "What tells a slow navigator from one that hangs, and what is to be done about each?",
         "Feedback is the sign of life: start a timer of 2 s at acceptance, and again with each.",
@@ -314,7 +314,7 @@ def drive_arrives(nodes: Nodes) -> None:
 
 
 @EXAM.check(
-    needs=("drive_arrives",),
+    builds_on=("drive_arrives",),
     hints=(
         "Who decides whether a request to cancel is accepted, who has to act on it, and what is "
         "left of the drive for the next goal?",
@@ -343,7 +343,7 @@ def drive_cancels(nodes: Nodes) -> None:
 
 
 @EXAM.check(
-    needs=("drive_arrives",),
+    builds_on=("drive_arrives",),
     hints=(
         "Follow a jam: which command meets it, and how soon? Who catches what that raises, and "
         "what is said and done before `execute` ends?",
@@ -376,7 +376,7 @@ def drive_aborts(nodes: Nodes) -> None:
 
 
 @EXAM.check(
-    needs=("gripper_answers",),
+    builds_on=("gripper_answers",),
     hints=(
         "A try's time is up, and then its answer arrives: in the pause, in the next try, or in the "
         "next request. Where does it end up in your node?",
@@ -437,7 +437,7 @@ def gripper_stale(nodes: Nodes) -> None:
 
 
 @EXAM.check(
-    needs=("gripper_answers",),
+    builds_on=("gripper_answers",),
     hints=(
         "What goes on in your node while nobody answers, or nobody is there: which tries, for how "
         "long each, and does the heart's timer run?",
@@ -490,7 +490,7 @@ def gripper_absent(nodes: Nodes) -> None:
 
 
 @EXAM.check(
-    needs=("speed_serves",),
+    builds_on=("speed_serves",),
     hints=(
         "When do you store a new limit: before or after everything about the request is known?",
         "Work on a copy, and let it take the place of the limits after `set_limits` has returned.",
@@ -527,7 +527,7 @@ def speed_atomic(nodes: Nodes) -> None:
 
 
 @EXAM.check(
-    needs=("goals_end",),
+    builds_on=("goals_end",),
     hints=(
         "A client waits for three answers: to the goal, of the drive, to the cancel. What does "
         "your node do if one of them is no, late, or never comes?",
@@ -597,7 +597,7 @@ def goals_lost(nodes: Nodes) -> None:
 
 
 @EXAM.check(
-    needs=("drive_arrives",),
+    builds_on=("drive_arrives",),
     hints=(
         "Which of your lines run when somebody calls `shutdown()`, on the way or not, and which "
         "may tell the wheels something after that?",

@@ -324,3 +324,20 @@ def test_an_error_of_the_students_code_in_a_check_is_not_the_graders(
     check = checks(exam, "hidden")[0]
     assert check.status == "failed"
     assert check.actual == "It raised KeyError: 'x'. It happened here:\n  line 3, in tick\n"
+
+
+@pytest.mark.parametrize(("fault", "status"), [("", "passed"), ("right", "not_checked")])
+def test_what_builds_on_a_check_that_failed_is_made_all_the_same_and_told_once(
+    exam: Exam[list[str]], fault: str, status: str
+) -> None:
+    exam.checks["third"] = replace(exam.checks["third"], needs=(), builds_on=("second",))
+
+    def fly(_rig: list[str]) -> None:
+        if fault:
+            raise Failed(expected="left", actual=fault)
+
+    exam.checks["third"] = replace(exam.checks["third"], run=fly)
+    _, second, third = checks(exam, "visible")
+    assert (second.status, third.status) == ("failed", status)
+    assert third.points == (4.0 if status == "passed" else 0.0)
+    assert third.actual == ("This needs “It runs” first." if fault else "")
