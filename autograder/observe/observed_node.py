@@ -32,6 +32,12 @@ from course.errors import WaitTimeout
 
 STRIDE_S = 0.1
 """Seconds of the node's time between two looks at what came."""
+POLLED_S, MOST_NAPS = 0.05, 2
+"""Seconds of wall time, while the node's time stands still, in which a thread that goes to sleep
+more often than this polls: it looks at the clock now and then, and sees late that time passed."""
+LULL_S, LATE_S = 0.1, 2.0
+"""Seconds of wall time in which nothing comes of such a thread, once it has caught up with the
+node's time; and those that it may take for that."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +118,7 @@ class ObservedNode:
                 end.connect(served)
             self._await_discovery()
         self.rest()
+        self._is_polling = self._find_polling()
 
     # What it has.
 
@@ -196,6 +203,7 @@ class ObservedNode:
             self._stride(seconds / strides)
             if pace:
                 self._let_wall_time_pass(pace * seconds / strides)
+        self._let_late_ones_come()
         came = {
             topic.name: self.end.heard(topic)[self._looked_at[topic.name] :] for topic in topics
         }
@@ -294,6 +302,28 @@ class ObservedNode:
     def _let_wall_time_pass(self, seconds: float) -> None:
         with suppress(WaitTimeout):
             self._bench.session.until(lambda: False, timeout=seconds, what="a moment")
+
+    def _find_polling(self) -> bool:
+        """Return whether a thread looks at something again and again while time stands still."""
+        outside = self._bench.outside
+        before = dict(outside.ask("naps", threads=outside.ask("threads")))
+        self._let_wall_time_pass(POLLED_S)
+        naps = dict(outside.ask("naps", threads=[*before]))
+        return any(number - before[thread] > MOST_NAPS for thread, number in naps.items())
+
+    def _let_late_ones_come(self) -> None:
+        """Wait, if a thread polls, for what it is late with: that belongs to this span."""
+        if not self._is_polling:
+            return
+        patience = Patience(self._still, LATE_S)
+        while patience.seconds_left:
+            before = self._count_heard()
+            self._let_wall_time_pass(LULL_S)
+            if self._count_heard() == before:
+                return
+
+    def _count_heard(self) -> int:
+        return sum(len(self.end.heard(topic)) for topic in self._task.publishes)
 
     def _stands_still(self, topic: Topic, seconds: float) -> bool:
         """Return whether nothing comes on a topic while the node's time stands still."""

@@ -277,7 +277,8 @@ def test_nbgrader_validate_passes_the_exemplar_and_fails_the_stub(course: Course
 
 def test_the_release_gives_nothing_away(course: Course) -> None:
     folder = course.root / "release" / ASSIGNMENT
-    assert [path.name for path in folder.rglob("*") if path.is_file()] == [f"{NOTEBOOK}.ipynb"]
+    files = {path.name for path in folder.rglob("*") if path.is_file()}
+    assert files == {f"{NOTEBOOK}.ipynb", f"{NOTEBOOK}.svg"}
     text = (folder / f"{NOTEBOOK}.ipynb").read_text()
     for secret in ("SOLUTION", "HIDDEN TESTS", 'part=\\"hidden\\"', "depth=5", "BEST_EFFORT,"):
         assert secret not in text

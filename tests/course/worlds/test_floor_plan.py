@@ -11,8 +11,8 @@ from course.worlds.floor_plan import FloorPlanError, load_floor_plan, plan_names
 SOUND = "name: hall\nsize: [10, 8]\nstart: {x: 2, y: 2}\n"
 
 
-def test_there_are_a_warehouse_and_a_corridor():
-    assert plan_names() == ["corridor", "warehouse"]
+def test_there_are_a_corridor_a_hall_and_a_warehouse():
+    assert plan_names() == ["corridor", "hall", "warehouse"]
     warehouse = load_floor_plan("warehouse")
     assert (warehouse.name, warehouse.slip) == ("warehouse", 0.0)
     assert len(warehouse.shelves) == 6
@@ -30,8 +30,8 @@ def test_an_unknown_name_and_an_unknown_path_say_what_there_is(tmp_path: Path):
     with pytest.raises(FloorPlanError) as caught:
         load_floor_plan("warehosue")
     assert str(caught.value) == (
-        "There is no world 'warehosue': there are corridor, warehouse, or give the path of a floor "
-        "plan of your own, such as './my_floor.yaml'. Did you mean 'warehouse'?"
+        "There is no world 'warehosue': there are corridor, hall, warehouse, or give the path of a "
+        "floor plan of your own, such as './my_floor.yaml'. Did you mean 'warehouse'?"
     )
     with pytest.raises(FloorPlanError, match=r"no floor plan .*none\.yaml: look at its path"):
         load_floor_plan(tmp_path / "none.yaml")
