@@ -256,7 +256,7 @@ def test_every_view_is_honest_after_a_restart_and_in_a_notebook_that_is_opened_a
         expect(copy).to_be_hidden()
     page.restart_kernel()
     for label in saved:
-        expect(region(page, label).locator(".rosview-status")).to_contain_text("Run this cell agai")
+        expect(region(page, label).locator(".rosview-status")).to_contain_text("Run the cells above again")
     page.save()
     page.reload()
     for copy in saved.values():
@@ -465,6 +465,7 @@ def test_graph_and_timeline_are_in_sight_whole_on_a_narrow_page(
     open_cells: Open, width: int
 ) -> None:
     page = open_cells("session.graph()", 'session.timeline("chatter")')
+    page.page.keyboard.press("Control+b")  # the list of files would take more than half of it
     page.page.set_viewport_size({"width": width, "height": 700})
     graph, timeline = region(page, "ROS graph"), region(page, "Timeline")
     expect(graph.locator("svg text", has_text="/listener")).to_be_visible()
