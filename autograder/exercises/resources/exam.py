@@ -126,7 +126,7 @@ def camera_given_back(rig: CameraRig) -> None:
 
 @EXAM.check(
     needs=("camera_given_back",),
-    builds_on=("endpoints_gone",),
+    builds_on=("driver_runs", "endpoints_gone"),
     hints=(
         "Write down what your constructor makes. What of it does destroy_node() not end?",
         "A thread that waits for ever in queue.get() never ends; a list of the class, or a "
@@ -148,7 +148,7 @@ def lives_are_flat(rig: CameraRig) -> None:
 
 
 @EXAM.check(
-    builds_on=("camera_given_back",),
+    builds_on=("driver_runs", "camera_given_back"),
     hints=(
         "What has ended when destroy_node() returns for the first time, what does a second call "
         "find, and what the next driver? A session calls it, and a test, and a `finally:`.",
@@ -180,7 +180,7 @@ def cleanup_twice(rig: CameraRig) -> None:
 
 
 @EXAM.check(
-    builds_on=("endpoints_gone", "camera_given_back"),
+    builds_on=("driver_runs", "endpoints_gone", "camera_given_back"),
     hints=(
         "Let each line of your constructor raise in your mind. What is open at that moment?",
         "The camera 'stuck' opens, but its stream does not start. Try CameraDriver('stuck') twice: "
@@ -309,7 +309,7 @@ def managed_gives_back(rig: CameraRig) -> None:
 
 
 @EXAM.check(
-    builds_on=("managed_gives_back",),
+    builds_on=("managed_runs", "managed_gives_back"),
     hints=(
         "What does your on_configure return for a rate or a camera that it cannot have, and what "
         "has it opened by then?",
@@ -370,7 +370,7 @@ def activation_error(rig: CameraRig) -> None:
 
 
 @EXAM.check(
-    builds_on=("managed_gives_back",),
+    builds_on=("managed_runs", "managed_gives_back"),
     hints=(
         "From which states can a node be shut down, or destroyed? Which of your methods runs then?",
         "on_shutdown, and neither on_deactivate nor on_cleanup before it.",
@@ -440,7 +440,7 @@ def callback_raises(rig: CameraRig) -> None:
 
 
 @EXAM.check(
-    builds_on=("endpoints_gone", "camera_given_back"),
+    builds_on=("driver_runs", "endpoints_gone", "camera_given_back"),
     hints=(
         "A callback waits for a picture, and destroy_node() runs in another thread. Who waits for "
         "whom, and for how many pictures?",
