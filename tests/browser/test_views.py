@@ -256,7 +256,9 @@ def test_every_view_is_honest_after_a_restart_and_in_a_notebook_that_is_opened_a
         expect(copy).to_be_hidden()
     page.restart_kernel()
     for label in saved:
-        expect(region(page, label).locator(".rosview-status")).to_contain_text("Run the cells above again")
+        expect(region(page, label).locator(".rosview-status")).to_contain_text(
+            "Run the cells above again"
+        )
     page.save()
     page.reload()
     for copy in saved.values():
