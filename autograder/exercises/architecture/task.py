@@ -36,13 +36,11 @@
 # %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-try-it", "locked": true, "schema_version": 3, "solution": false}
 # ## Try it
 #
-# Once the cells below have run, bring your design up in a cell of your own:
+# Once the cells below have run, you can see your design at work.
 #
-# ```python
-# design.run()                     # its nodes, as the examiner sees them
-# course.session().graph()         # drawn from the ROS graph; what is not connected is red
-# course.session().diagnose()      # what is wrong with it, in words
-# ```
+# **Look inside**, in cells of your own after `import course`: `design.run()` brings its nodes up, as
+# the examiner does; `course.session().graph()` draws them from the ROS graph, with what is not
+# connected in red; and `course.session().diagnose()` says in words what is wrong.
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-fine-print", "locked": true, "schema_version": 3, "solution": false}
 # <details><summary>What exactly is examined</summary>

@@ -3,7 +3,7 @@
 # exercise: resources
 # base: right-no-thread
 # told: a zoom of
-# score: 6
+# score: 12
 
 KNOWN = {}
 

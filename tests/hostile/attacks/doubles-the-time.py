@@ -3,7 +3,7 @@
 # exercise: resources
 # base: right-exemplar
 # told: it takes ten pictures a second by the machine's clock.
-# score: 6
+# score: 14
 
 from autograder.examination.subject.server import SubjectServer
 

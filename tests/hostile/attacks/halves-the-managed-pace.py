@@ -3,7 +3,7 @@
 # exercise: resources
 # base: right-exemplar
 # told: as many pictures a second by the machine's clock as its rate says
-# score: 12
+# score: 14
 
 from autograder.examination.subject.server import SubjectServer
 

@@ -5,7 +5,7 @@
 # told: by the time on /clock, the gripper was called 2 times | could not be timed in a plain program of your nodes: An answer after 0.7 s
 # told: by the time on /clock, the request to cancel came after 1.0 s | could not be timed in a plain program of your nodes: The goal is canceled 2 s
 # told: by the time on /clock, it took 1.5 s | could not be timed in a plain program of your nodes: A goal of 3 m
-# score: 4
+# score: 9
 
 from autograder.examination.subject.server import SubjectServer
 

@@ -3,7 +3,7 @@
 # exercise: resources
 # base: right-exemplar
 # told: Each of 5 rounds left 5 MiB | Each of 5 rounds left 4 MiB
-# score: 12
+# score: 14
 
 from autograder.examination.subject.server import SubjectServer
 

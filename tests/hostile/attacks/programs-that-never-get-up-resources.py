@@ -2,7 +2,7 @@
 # exercise: resources
 # base: right-no-thread
 # told: It took none.
-# score: 6
+# score: 10
 
 import sys
 import threading
