@@ -29,7 +29,7 @@ function toolbar(state, act) {
       press(pause, frame.paused);
       press(stop, frame.robot.stopped);
       if (document.activeElement !== pace) pace.value = String(frame.speed);
-      say(time, `${frame.time.toFixed(1)} s${frame.paused ? ", paused" : ""}`);
+      say(time, `${frame.time.toFixed(frame.paused ? 2 : 1)} s${frame.paused ? ", paused" : ""}`);
     },
   };
 }
