@@ -280,7 +280,13 @@ def test_the_release_gives_nothing_away(course: Course) -> None:
     files = {path.name for path in folder.rglob("*") if path.is_file()}
     assert files == {f"{NOTEBOOK}.ipynb", f"{NOTEBOOK}.svg"}
     text = (folder / f"{NOTEBOOK}.ipynb").read_text()
-    for secret in ("SOLUTION", "HIDDEN TESTS", 'part=\\"hidden\\"', "depth=5", "Policy.BEST_EFFORT"):
+    for secret in (
+        "SOLUTION",
+        "HIDDEN TESTS",
+        'part=\\"hidden\\"',
+        "depth=5",
+        "Policy.BEST_EFFORT",
+    ):
         assert secret not in text
 
 
