@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor, ParameterType
@@ -118,7 +118,6 @@ class ObservedNode:
                 end.connect(served)
             self._await_discovery()
         self.rest()
-        self._is_polling = self._find_polling()
 
     # What it has.
 
@@ -303,8 +302,9 @@ class ObservedNode:
         with suppress(WaitTimeout):
             self._bench.session.until(lambda: False, timeout=seconds, what="a moment")
 
-    def _find_polling(self) -> bool:
-        """Return whether a thread looks at something again and again while time stands still."""
+    @cached_property
+    def _is_polling(self) -> bool:
+        """Whether a thread looks at something again and again while time stands still."""
         outside = self._bench.outside
         before = dict(outside.ask("naps", threads=outside.ask("threads")))
         self._let_wall_time_pass(POLLED_S)

@@ -102,8 +102,8 @@
 #
 # **Links** (1 point)
 #
-# - Every topic has a writer and a reader, and at least one leads from one node to another; whoever
-#   calls a service or sends goals finds one server; and the QoS of both sides fits, that of services,
+# - Every topic has a writer and a reader, and at least one leads from one node to another; each
+#   client of a service or an action finds one server; and the QoS of both sides fits, that of services,
 #   too. Only `motors/command` is read, and `navigate_to` used, by somebody outside.
 # - Each node has a full name of its own: `/front/driver` beside `/rear/driver` is right.
 #
@@ -277,7 +277,7 @@ check("architecture", part="hidden")
 # ### BEGIN SOLUTION
 # Each sensor has a driver, so that a new LIDAR means one new node; detection can be tested with
 # recorded scans and restarted while the robot goes on; one controller alone commands the motors.
-# Driving takes minutes, so whoever sent the goal wants to see progress and to cancel: an action. A
+# Driving takes minutes, so the sender of a goal wants to see progress and to cancel: an action. A
 # path is needed once a goal, or when the way is blocked: one question, one answer, a service.
 # ### END SOLUTION
 
