@@ -5,8 +5,8 @@ up left out, a reply that is not returned, a sleep in a callback, a callback gro
 moved. A mutation that an exam does not notice is a check that is missing, or changes nothing.
 
 Example:
-    >>> [str(m) for m in find_mutations("qos.depth = 5\\nself.timer.cancel()\\n")]
-    ['line 1, number: `qos.depth = 5` becomes `qos.depth = 6`', 'line 2, call left out: \
+    >>> [str(m) for m in find_mutations("self.rate = 5\\nself.timer.cancel()\\n")]
+    ['line 1, number: `self.rate = 5` becomes `self.rate = 6`', 'line 2, call left out: \
 `self.timer.cancel()` becomes `pass`']
 """
 
@@ -28,6 +28,13 @@ _OTHER_COMPARISON = {
     ast.Lt: "<=", ast.LtE: "<", ast.Gt: ">=", ast.GtE: ">", ast.Eq: "!=", ast.NotEq: "==",
     ast.Is: "is not", ast.IsNot: "is", ast.In: "not in", ast.NotIn: "in",
 }  # fmt: skip
+_SHALLOW, _DEEP = 1, 100
+"""Depths of a queue that hold one message, and more than any is worth keeping of."""
+_OF_ENDPOINTS: dict[str, dict[int, tuple[int, ...]]] = {
+    "create_publisher": {2: ()},
+    "create_subscription": {3: (_SHALLOW,)},
+}
+"""Where the depth stands among the arguments, and what it may wrongly be."""
 _SLEEP_S = 2.0
 """Seconds that a callback sleeps: longer than a node may be held up in any task."""
 
@@ -70,11 +77,12 @@ def find_mutations(text: str) -> list[Mutation]:
         SyntaxError: the solution does not compile.
     """
     tree = ast.parse(text)
+    unused = _overwritten(tree)
     found: dict[str, Mutation] = {}
-    for operator in (_names, _numbers, _booleans, _comparisons, _conditions, _calls, _returns,
-                     _groups, _sleeps):  # fmt: skip
+    for operator in (_names, _depths, _numbers, _booleans, _comparisons, _conditions, _calls,
+                     _returns, _groups, _sleeps):  # fmt: skip
         for edit in operator(tree):
-            mutation = _apply(text, *edit)
+            mutation = None if edit[1] in unused else _apply(text, *edit)
             if mutation is not None:
                 found.setdefault(mutation.text, mutation)
     return sorted(found.values(), key=lambda mutation: (mutation.line, mutation.operator))
@@ -93,6 +101,8 @@ def _apply(text: str, operator: str, node: ast.AST, new: str) -> Mutation | None
     if mutated == text:
         return None
     after = mutated[text.rfind("\n", 0, begin) + 1 :].split("\n", 1)[0].strip()
+    if "\n" in new:  # a line of its own before the one that was there
+        after += f"; {lines[node.lineno - 1].strip()}"
     return Mutation(operator, node.lineno, lines[node.lineno - 1].strip(), after, mutated)
 
 
@@ -100,6 +110,22 @@ def _offset(lines: list[str], line: int, column: int) -> int:
     """Return the place in the text of a column that Python counts in bytes of UTF-8."""
     before = sum(map(len, lines[: line - 1]))
     return before + len(lines[line - 1].encode()[:column].decode())
+
+
+def _overwritten(tree: ast.Module) -> set[ast.AST]:
+    """Return all that stands in assignments of a module which another one undoes unread."""
+    unused: set[ast.AST] = set()
+    pending: dict[str, ast.Assign] = {}
+    for statement in tree.body:
+        for node in ast.walk(statement):
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
+                pending.pop(node.id, None)
+        if isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name):
+            name = statement.targets[0].id
+            if name in pending:
+                unused.update(ast.walk(pending[name]))
+            pending[name] = statement
+    return unused
 
 
 def _names(tree: ast.AST) -> Iterator[_Edit]:
@@ -111,8 +137,37 @@ def _names(tree: ast.AST) -> Iterator[_Edit]:
             yield "other callback group", node, _OTHER_NAME[node.id]
 
 
-def _numbers(tree: ast.AST) -> Iterator[_Edit]:
+def _depths(tree: ast.AST) -> Iterator[_Edit]:
+    for number, depths in _find_depths(tree).items():
+        for depth in depths:
+            yield "depth of a queue", number, str(depth)
+
+
+def _find_depths(tree: ast.AST) -> dict[ast.Constant, tuple[int, ...]]:
+    """Return what a depth of a queue may wrongly be: that of a profile, or of an endpoint.
+
+    An endpoint that just says 10 means no more than that its queue is not short.
+    """
+    found: dict[ast.Constant, tuple[int, ...]] = {}
     for node in ast.walk(tree):
+        if not isinstance(node, ast.Call):
+            continue
+        for word in node.keywords:
+            if word.arg == "depth" and isinstance(word.value, ast.Constant):
+                found[word.value] = (_SHALLOW, _DEEP)
+        called = ast.unparse(node.func).rpartition(".")[2]
+        for place, depths in _OF_ENDPOINTS.get(called, {}).items():
+            for value in node.args[place : place + 1]:
+                if isinstance(value, ast.Constant):
+                    found[value] = depths
+    return found
+
+
+def _numbers(tree: ast.AST) -> Iterator[_Edit]:
+    depths = _find_depths(tree)
+    for node in ast.walk(tree):
+        if node in depths:
+            continue
         if isinstance(node, ast.Constant) and type(node.value) is int:
             yield "number", node, str(node.value + 1)
         elif isinstance(node, ast.Constant) and type(node.value) is float:

@@ -20,7 +20,6 @@ MIN_DOMAIN, MAX_DOMAIN = 0, 101
 """Domain ids that are safe on Linux (ROS 2 docs, "The ROS_DOMAIN_ID": above 101 the ports of DDS
 run into the ephemeral ports; from 233 on Fast DDS ends the process)."""
 
-_PORT_BASE, _PORTS_PER_DOMAIN = 7400, 250  # DDSI-RTPS 2.2, section 9.6.1.1: PB and DG
 _leases: weakref.WeakSet[DomainLease] = weakref.WeakSet()
 
 
@@ -71,13 +70,13 @@ def lease_domain() -> DomainLease:
     Raises:
         DomainError: every domain is taken.
     """
-    port_files.remove_abandoned()
     in_use = domains_in_use()
     candidates = list(range(MIN_DOMAIN + 1, MAX_DOMAIN + 1))
     # A random order: a class of kernels that start at once must not race for the same first id.
     random.SystemRandom().shuffle(candidates)
     for domain_id in candidates:
         if domain_id not in in_use and (sock := _claim_domain(domain_id)) is not None:
+            port_files.remove_abandoned(domain_id)
             return DomainLease(domain_id, sock)
     raise DomainError(
         f"All ROS domains from {MIN_DOMAIN + 1} to {MAX_DOMAIN} on this machine are taken: "
@@ -101,7 +100,7 @@ def domains_in_use() -> set[int]:
             continue
         for line in lines:
             port = int(line.split()[1].rpartition(":")[2], 16)
-            domains.add((port - _PORT_BASE) // _PORTS_PER_DOMAIN)
+            domains.add((port - port_files.FIRST_PORT) // port_files.DOMAIN_GAIN)
     return domains
 
 

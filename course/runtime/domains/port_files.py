@@ -15,6 +15,8 @@ from contextlib import suppress
 from pathlib import Path
 
 FOLDER = Path("/dev/shm")
+FIRST_PORT, DOMAIN_GAIN = 7400, 250
+"""The first port of domain 0, and ports of a domain: DDSI-RTPS 2.2, section 9.6.1.1, PB and DG."""
 MAKING_S = 1.0
 """Seconds that making a port takes at most; it takes some microseconds."""
 
@@ -22,13 +24,16 @@ _INITIALISED = (2).to_bytes(4, "little")
 _LOOK_AGAIN_S = 0.01
 
 
-def remove_abandoned(folder: Path = FOLDER) -> None:
-    """Remove the ports that were left half made; wait for one that may still be in the making.
+def remove_abandoned(domain_id: int, folder: Path = FOLDER) -> None:
+    """Remove a domain's ports that were left half made; wait for one that may be in the making.
 
-    Another user's stay: DDS may not open them and goes on without.
+    Another user's stay: DDS may not open them and goes on without. Other domains' ports are not
+    looked at: where kernels are killed, there are thousands of them in time.
     """
-    for path in folder.glob("fastrtps_port*[0-9]"):
-        with suppress(OSError):  # its maker has removed it, or is another user
+    first = FIRST_PORT + DOMAIN_GAIN * domain_id
+    for port in range(first, first + 2 * DOMAIN_GAIN):  # the last participants' are the next one's
+        path = folder / f"fastrtps_port{port}"
+        with suppress(OSError):  # there is none; its maker has removed it, or is another user
             if _is_abandoned(path):
                 path.unlink()
 
