@@ -113,19 +113,25 @@ def _offset(lines: list[str], line: int, column: int) -> int:
 
 
 def _overwritten(tree: ast.Module) -> set[ast.AST]:
-    """Return all that stands in assignments of a module which another one undoes unread."""
+    """Return all that stands in definitions of a module which another one replaces unused."""
     unused: set[ast.AST] = set()
-    pending: dict[str, ast.Assign] = {}
+    pending: dict[str, ast.stmt] = {}
     for statement in tree.body:
         for node in ast.walk(statement):
             if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
                 pending.pop(node.id, None)
-        if isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name):
-            name = statement.targets[0].id
-            if name in pending:
-                unused.update(ast.walk(pending[name]))
+        if name := _defined_name(statement):
+            unused.update(ast.walk(pending[name]) if name in pending else ())
             pending[name] = statement
     return unused
+
+
+def _defined_name(statement: ast.stmt) -> str | None:
+    if isinstance(statement, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+        return statement.name
+    if isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name):
+        return statement.targets[0].id
+    return None
 
 
 def _names(tree: ast.AST) -> Iterator[_Edit]:
