@@ -144,6 +144,7 @@ _TEXTS = {
     "Twist": lambda message: f"{message.linear.x:.2f} m/s, {message.angular.z:.2f} rad/s",
     "String": lambda message: repr(message.data),
     "Bool": lambda message: str(message.data).lower(),
+    "Float64": lambda message: f"{message.data:.2f}",
     "Path": lambda message: f"{len(message.poses)} poses",
     "PoseArray": lambda message: f"{len(message.poses)} obstacles",
 }
