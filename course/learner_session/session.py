@@ -45,7 +45,7 @@ class Session(CoreSession):
         clock, and ends with the session, or when you ask for a world again.
 
         Args:
-            name: "warehouse", "corridor", "hall", or the path of a floor plan of your own (YAML).
+            name: "warehouse", "aisle", "corridor", "hall", or the path of your floor plan (YAML).
             seed: decides on the noise of the sensors: the same seed makes the same noise.
 
         Raises:

@@ -12,7 +12,8 @@ from course.watch.lives import Held, left_each
 COLUMNS = ("threads", "open files", "nodes and endpoints")
 ABOUT = (
     "Measured in this process, up to 1 s after the end of each life. One life came before them: it "
-    "is not counted, as it also starts what the session needs."
+    "is not counted, as it also starts what the session needs. A notebook's own threads come and "
+    "go, so one more or less says nothing."
 )
 
 

@@ -12,12 +12,15 @@ from course.views.world import World
 MOST_VIEWS = 8
 """Views of one panel: more do not fit on a screen."""
 
-NARROWEST_PX = 330
-"""Width below which there are fewer views in a row."""
+WORLD_PX, NARROWEST_PX = 440, 330
+"""Width that a world and another view have at least: on a narrow page they go below each other."""
+
+
+GAP = "8px"
 
 
 class Panel:
-    """Live views in a grid; a world has a row of its own.
+    """Live views beside each other; a world is at the left of all others.
 
     Outside of a notebook, and for a screen reader, it is the words of its views.
 
@@ -54,21 +57,30 @@ class Panel:
         import ipywidgets
 
         widgets = [view.widget for view in self.views]
-        for view, widget in zip(self.views, widgets, strict=True):
-            widget.layout = ipywidgets.Layout(
-                min_width="0", grid_column="1 / -1" if isinstance(view, World) else None
-            )
-        box = ipywidgets.Box(
-            widgets,
+        worlds = [view.widget for view in self.views if isinstance(view, World)]
+        others = [widget for widget in widgets if widget not in worlds]
+        for widget in widgets:
+            widget.layout = ipywidgets.Layout(min_width="0")
+        instruments = ipywidgets.Box(
+            others,
             layout=ipywidgets.Layout(
-                display="grid", grid_gap="8px", width="100%",
+                display="grid", grid_gap=GAP, min_width="0", flex=f"2 1 {NARROWEST_PX}px",
                 grid_template_columns=f"repeat(auto-fit, minmax(min(100%, {NARROWEST_PX}px), 1fr))",
             ),
         )  # fmt: skip
+        for widget in worlds:
+            widget.layout.flex = f"3 1 {WORLD_PX}px"
+        box = ipywidgets.Box(
+            [*worlds, instruments],
+            layout=ipywidgets.Layout(
+                display="flex", flex_flow="row wrap", align_items="flex-start", grid_gap=GAP
+            ),
+        )
         box.add_class("rospanel")
 
         def close_if_empty(_change: Any) -> None:
             if not any(widget.comm for widget in widgets):
+                instruments.close()
                 box.close()
 
         for widget in widgets:

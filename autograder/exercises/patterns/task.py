@@ -43,7 +43,7 @@
 # world = course.world("aisle")  # its robot is the hardware; it stands at station 0
 # robot = course.run(RobotInterface, threads=4)
 # course.session().panel(
-#     world, "robot/position", "robot/camera", "robot/navigate", robot, "robot/battery"
+#     world, "robot/navigate", "robot/position", robot, "robot/battery", "robot/camera"
 # )
 # ```
 #

@@ -23,7 +23,7 @@
 # ## What it must do
 #
 # - **A. `GripperClient`** has the gripper opened and closed: three tries of 1 s, pauses of 0.5 s
-#   and 1 s, and one word of what came of it. Its heart beats every 0.5 s.
+#   and 1 s, and one word for the outcome. Its heart beats every 0.5 s.
 # - **B. `SpeedServer`** sets limits up to 1 m/s and 2 rad/s, and refuses nonsense with a reason.
 # - **C. `NavigationClient`** sends the robot off; it gives up after 1 s without answer, or 2 s
 #   without feedback.
