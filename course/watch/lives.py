@@ -12,6 +12,7 @@ from rclpy.node import Node
 from course.graph.reader import read_graph
 from course.runtime.core_session import CoreSession
 from course.runtime.requests.graph_queries import full_topic, type_on
+from course.runtime.teardown import destroy_leftovers
 from course.runtime.waiting import Pulse, poll_condition
 
 SETTLE_S = 1.0
@@ -43,7 +44,9 @@ def count_held(session: CoreSession) -> Held:
 def live_repeatedly(
     session: CoreSession, make: Callable[[int], Node], topic: str, times: int, timeout: float
 ) -> list[Held]:
-    """Make a node, wait until it publishes, and stop it, again and again.
+    """Make a node, wait until it publishes, and have it destroy itself, again and again.
+
+    Nobody tidies up after ``destroy_node()`` until all has been counted.
 
     Args:
         session: runs the node.
@@ -60,13 +63,23 @@ def live_repeatedly(
         WaitTimeout: no message came.
     """
     held: list[Held] = []
-    for life in range(times + 1):
-        node = session.run(lambda life=life: make(life))
-        try:
-            _await_message(session, topic, timeout)
-        finally:
-            session.stop(node)
-        held.append(_settle(session, held[-1] if held else None))
+    nodes: list[Node] = []
+    try:
+        for life in range(times + 1):
+            node = session.run(lambda life=life: make(life))
+            nodes.append(node)
+            try:
+                _await_message(session, topic, timeout)
+            except BaseException:
+                session.stop(node)
+                raise
+            session.let_go(node)
+            node.destroy_node()
+            held.append(_settle(session, held[-1] if held else None))
+    finally:
+        for node in nodes:
+            session.let_go(node)
+            destroy_leftovers(node)
     return held
 
 
