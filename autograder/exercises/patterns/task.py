@@ -368,8 +368,8 @@ class RobotInterface(Robot):
 # (so it answers others, too, while a goal is under way), and then use it as an operator would.
 # `course.session().service(name)` and `course.session().action(name)` are forms for a service and an
 # action, `course.session().timeline(name)` shows a topic's messages,
-# `course.session().parameters("robot_interface")` a node's parameters: whichever you chose. No motor
-# turns here, so a drive ends when you cancel it, or move the robot yourself:
+# `course.session().parameters("robot_interface")` a node's parameters: whichever you chose. Without a
+# world no motor turns, so a drive ends when you cancel it, or move the robot yourself:
 # `%ros topic pub --once /hardware/position std_msgs/msg/Float64 "data: 3.0"` puts it at 3 m.
 
 # %% nbgrader={"grade": true, "grade_id": "patterns-visible", "locked": true, "points": 0, "schema_version": 3, "solution": false}
