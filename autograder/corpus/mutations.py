@@ -13,7 +13,7 @@ Example:
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 _OTHER_NAME = {
@@ -32,6 +32,7 @@ _SHALLOW, _DEEP = 1, 100
 """Depths of a queue that hold one message, and more than any is worth keeping of."""
 _OF_ENDPOINTS: dict[str, dict[int, tuple[int, ...]]] = {
     "create_publisher": {2: ()},
+    "create_lifecycle_publisher": {2: ()},
     "create_subscription": {3: (_SHALLOW,)},
 }
 """Where the depth stands among the arguments, and what it may wrongly be."""
@@ -46,12 +47,14 @@ class Mutation:
     Attributes:
         operator: the kind of mistake.
         line: where it is, from 1 on.
+        scope: the function in which it is, or what is assigned outside of any, or an empty text.
         before: the line as it was, and ``after``: as it is now, both without indentation.
         text: all of the solution with the mistake.
     """
 
     operator: str
     line: int
+    scope: str
     before: str
     after: str
     text: str
@@ -59,7 +62,8 @@ class Mutation:
     @property
     def key(self) -> str:
         """What names it where a corpus says that it changes nothing: no number of a line."""
-        return f"{self.operator}: {self.before} -> {self.after}"
+        where = f" in {self.scope}" if self.scope else ""
+        return f"{self.operator}{where}: {self.before} -> {self.after}"
 
     def __str__(self) -> str:
         """Return it as a phrase."""
@@ -77,18 +81,21 @@ def find_mutations(text: str) -> list[Mutation]:
         SyntaxError: the solution does not compile.
     """
     tree = ast.parse(text)
-    unused = _overwritten(tree)
+    unused = {node for body in _bodies(tree) for node in _overwritten(body)}
+    scopes = _scopes(tree)
     found: dict[str, Mutation] = {}
     for operator in (_names, _depths, _numbers, _booleans, _comparisons, _conditions, _calls,
                      _returns, _groups, _sleeps):  # fmt: skip
         for edit in operator(tree):
-            mutation = None if edit[1] in unused else _apply(text, *edit)
+            mutation = None if edit[1] in unused else _apply(text, scopes, *edit)
             if mutation is not None:
                 found.setdefault(mutation.text, mutation)
     return sorted(found.values(), key=lambda mutation: (mutation.line, mutation.operator))
 
 
-def _apply(text: str, operator: str, node: ast.AST, new: str) -> Mutation | None:
+def _apply(
+    text: str, scopes: Mapping[ast.AST, str], operator: str, node: ast.AST, new: str
+) -> Mutation | None:
     assert isinstance(node, ast.expr | ast.stmt | ast.keyword)
     lines = text.splitlines(keepends=True)
     begin = _offset(lines, node.lineno, node.col_offset)
@@ -103,7 +110,8 @@ def _apply(text: str, operator: str, node: ast.AST, new: str) -> Mutation | None
     after = mutated[text.rfind("\n", 0, begin) + 1 :].split("\n", 1)[0].strip()
     if "\n" in new:  # a line of its own before the one that was there
         after += f"; {lines[node.lineno - 1].strip()}"
-    return Mutation(operator, node.lineno, lines[node.lineno - 1].strip(), after, mutated)
+    before, scope = lines[node.lineno - 1].strip(), scopes.get(node, "")
+    return Mutation(operator, node.lineno, scope, before, after, mutated)
 
 
 def _offset(lines: list[str], line: int, column: int) -> int:
@@ -112,11 +120,24 @@ def _offset(lines: list[str], line: int, column: int) -> int:
     return before + len(lines[line - 1].encode()[:column].decode())
 
 
-def _overwritten(tree: ast.Module) -> set[ast.AST]:
-    """Return all that stands in definitions of a module which another one replaces unused."""
+def _scopes(tree: ast.Module) -> dict[ast.AST, str]:
+    named: list[tuple[str, ast.AST]] = [
+        (name, statement) for statement in tree.body if (name := _defined_name(statement))
+    ]
+    named += [(function.name, function) for function in _functions(tree)]
+    return {inner: name for name, whole in named for inner in ast.walk(whole)}  # inmost last
+
+
+def _bodies(tree: ast.Module) -> Iterator[list[ast.stmt]]:
+    yield tree.body
+    yield from (function.body for function in _functions(tree))
+
+
+def _overwritten(body: list[ast.stmt]) -> set[ast.AST]:
+    """Return all that stands in definitions which another one in the same row replaces unused."""
     unused: set[ast.AST] = set()
     pending: dict[str, ast.stmt] = {}
-    for statement in tree.body:
+    for statement in body:
         for node in ast.walk(statement):
             if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
                 pending.pop(node.id, None)
@@ -233,7 +254,9 @@ def _groups(tree: ast.AST) -> Iterator[_Edit]:
 
 def _sleeps(tree: ast.AST) -> Iterator[_Edit]:
     sleep = f"__import__('time').sleep({_SLEEP_S:g})"
-    for node in _functions(tree, lambda name: not name.startswith("__")):
+    for node in _functions(tree):
+        if node.name.startswith("__"):
+            continue
         first = node.body[0]
         indent = " " * first.col_offset
         whole = "\n".join(
@@ -243,9 +266,7 @@ def _sleeps(tree: ast.AST) -> Iterator[_Edit]:
         yield "sleep in a callback", first, f"{sleep}\n{indent}{whole}"
 
 
-def _functions(
-    tree: ast.AST, wanted: Callable[[str], bool]
-) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
+def _functions(tree: ast.AST) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
     for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and wanted(node.name):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             yield node

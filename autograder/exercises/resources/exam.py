@@ -405,6 +405,7 @@ def managed_shutdown(rig: CameraRig) -> None:
                 if state == "active":  # by now the middleware has the threads that it keeps
                     rig.require_threads_ended(threads, when)
                 if end == "shutdown":
+                    camera.require_callbacks_ended(when)
                     rig.stop(MANAGED, bare=True)  # finalized is a state, too
                 rig.require_gone(camera.node, DESTROYED)
                 rig.destroy_again(MANAGED)

@@ -148,7 +148,8 @@
 #   that it started has ended, too, and with a good camera pictures come at the right rate.
 # - **Shut down** (hidden). After a shutdown from `unconfigured`, `inactive` and `active`, and after
 #   `destroy_node()` in each of these states, the camera is closed and there is no publisher; every
-#   thread that was started has ended (seen in `active`). A helper node that the node makes for a
+#   thread that was started has ended (seen in `active`). After a shutdown no callback goes on that
+#   raises, such as a timer's that still wants pictures. A helper node that the node makes for a
 #   state goes with a shutdown as well. After `destroy_node()`, in `finalized`, too, no node and no
 #   endpoint is left, and a second call does not raise.
 #

@@ -58,6 +58,17 @@ def test_what_another_definition_replaces_is_left_alone() -> None:
     assert [m.after for m in find_mutations(stub + right)] == ["wheels = 4"]
     used = find_mutations(stub + "first = Robot()\n" + right)
     assert [m.after for m in used if m.operator == "number"] == ["wheels = 5", "wheels = 4"]
+    given = "def f(self):\n    answer = NO\n    answer = 1\n    return answer\n"
+    assert not [m for m in find_mutations(given) if m.before == "answer = NO"]
+
+
+def test_a_mutation_says_in_which_function_it_is() -> None:
+    text = "def stop(self):\n    self.halt()\n\n\ndef end(self):\n    self.halt()\n"
+    left_out = [m.key for m in find_mutations(text) if m.operator == "call left out"]
+    assert left_out == [
+        "call left out in stop: self.halt() -> pass",
+        "call left out in end: self.halt() -> pass",
+    ]
 
 
 def test_the_depth_of_a_publisher_is_free() -> None:
@@ -68,7 +79,7 @@ def test_a_mutation_is_known_by_what_it_changes_and_not_by_its_line() -> None:
     (first,) = find_mutations("x = 1")
     (second,) = find_mutations("\n\nx = 1")
     assert (first.line, second.line) == (1, 3)
-    assert first.key == second.key == "number: x = 1 -> x = 2"
+    assert first.key == second.key == "number in x: x = 1 -> x = 2"
 
 
 @pytest.mark.parametrize("exam", sorted(exercises.exercise_names()))
