@@ -68,7 +68,8 @@ class WorkerThreads:
         return jobs
 
     def _run_jobs(self) -> None:
-        while (job := self._queue.get()) is not None:
+        # One whose callback went on for long may come back when `never_begun` has emptied the queue.
+        while not self._stopping and (job := self._queue.get()) is not None:
             if self._stopping:
                 self._queue.put(job)  # for `never_begun`
                 return
