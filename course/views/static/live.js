@@ -60,12 +60,13 @@ function render({ model, el }) {
       say();
     }
   };
-  const stage = make("fieldset", { class: "rosview-stage", role: "presentation" });
+  const stage = make("fieldset", { class: "rosview-parts", role: "presentation" });
+  const place = make("div", { class: "rosview-stage" }, stage);
   const words = make("pre", { class: "rosview-words", tabindex: "0" });
   const status = make("p", { class: "rosview-status", role: "status" });
   const root = make(
     "section", { class: `rosview rosview-${model.get("kind")}`, "aria-label": view.label },
-    stage,
+    place,
     make("details", {}, make("summary", {}, "In words"), words),
     status,
   );
@@ -103,10 +104,17 @@ function render({ model, el }) {
     const frame = model.get("frame");
     if (Object.keys(frame).length) drawing.draw({ ...model.get("fixed"), ...model.get("slow"), ...frame });
     retell();
+    makeReachable();
     guard(root);
     if (performance.now() - confirmed < CONFIRM_MS) return;
     confirmed = performance.now();
     send({ drawn: model.get("number") });
+  };
+  // What scrolls can be scrolled by keyboard; so can a view whose controls are disabled.
+  const makeReachable = () => {
+    const scrolls = place.scrollWidth > place.clientWidth || place.scrollHeight > place.clientHeight;
+    if (scrolls || stage.disabled) place.tabIndex = 0;
+    else place.removeAttribute("tabindex");
   };
   // Text that somebody has marked, to copy it, stands still until it is let go of.
   const retell = () => {
@@ -122,6 +130,7 @@ function render({ model, el }) {
   // What is drawn to fit its place is drawn again when that changes, also when nothing else comes.
   let width = 0;
   const resized = new ResizeObserver(() => {
+    makeReachable();
     if (width === stage.clientWidth) return;
     width = stage.clientWidth;
     waiting ||= requestAnimationFrame(draw);
@@ -133,6 +142,7 @@ function render({ model, el }) {
     root.classList.toggle("rosview-over", Boolean(over));
     // A fieldset disables what is in it, and what is disabled for reasons of its own stays so.
     stage.disabled = Boolean(over);
+    makeReachable();
     if (status.textContent !== text) status.textContent = text;
   };
   // JupyterLab says that the connection has changed, not how: a kernel that lives answers.
