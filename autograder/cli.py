@@ -54,13 +54,16 @@ def build(
 ) -> None:
     """Build the notebooks from their text sources."""
     from autograder import exercises
-    from autograder.assignments import listing
+    from autograder.assignments import chapter_sections, listing
     from autograder.assignments.build_notebooks import build as build_notebooks
 
     where = use_root(root)
     listed = {name for one in listing.of_course(where).values() for name in one.exercises}
     for name in sorted(listed):
         exercises.require_sound(name)
+    sections = chapter_sections.find_sections(where)
+    for name in sorted(listed & exercises.own_names()):
+        chapter_sections.require_sections(sections, name, exercises.where_to_read(name))
     for path in build_notebooks(where, check=check, with_solutions=with_solutions):
         out.print(str(path), soft_wrap=True)
     for name in sorted(exercises.own_names() - listed):

@@ -486,7 +486,8 @@ class CoreSession:
         """Stop every node and thread, shut the context down, give the domain back. Idempotent.
 
         Args:
-            timeout: seconds that callbacks which still run are given, all together.
+            timeout: seconds that callbacks which still run are given, all together; after half of
+                them their nodes are destroyed, so that a long one hears that it is to end.
 
         Returns:
             What was left behind: `leaked` names the threads whose callback did not end. Called
@@ -559,12 +560,17 @@ class CoreSession:
         self._endings.beat()
         if self._answering is not None:
             self._answering.stop()
-        leaked = self._host.pool.stop(deadline)
-        leaked += self._host.registry.forget_all()
+        # A callback that is at work for longer than half of the time may wait to be told that its
+        # node goes: by the node's own destroy_node(), its goal handle or rclpy.ok(). So what has
+        # leaked shows only after all of these.
+        now = time.monotonic()
+        self._host.pool.stop(now + (deadline - now) / 2)
+        problems = self._host.registry.forget_all()
         for callback in self._on_close:
             callback()
         self._host.pulse.beat()
         self.context.try_shutdown()
+        leaked = self._host.pool.find_leaks(deadline) + problems
         self._host.pool.shutdown(deadline)
         self.context.join(max(0.1, deadline - time.monotonic()))
         self.context.destroy()

@@ -35,7 +35,7 @@ from autograder.observe.nouns import Parameter
 EXAM: Exam[CameraRig] = Exam(
     "resources",
     CameraRig,
-    read="Chapter 5, “Nodes: lifecycle management” and “Nodes: resource management”",
+    read="Chapter 5, “Nodes: the processing units”: “Lifecycle management”, “Resource management”",
 )
 READ_MANAGED = "ROS 2 design, “Managed nodes”"
 FASTEST_HZ = 30.0

@@ -108,7 +108,10 @@ class LiveView(ABC):
         return ""
 
     def handle_control(self, message: dict[str, Any]) -> None:  # noqa: B027 - some views have no controls
-        """Do what a control in the browser asks for. Runs in the kernel's main thread."""
+        """Do what a control in the browser asks for.
+
+        Runs in a thread of the kernel's, also while a cell runs.
+        """
 
     @property
     def widget(self) -> LiveWidget:

@@ -27,7 +27,7 @@ function build(stage, first, send) {
   const facts = factList();
   const faults = faultButtons(first.floor.faults, act);
   const topics = topicTable(act);
-  const news = make("ul", { class: "rosworld-news", role: "log", "aria-label": "News" });
+  const news = make("ul", { class: "rosworld-news" });
   const problem = make("p", { class: "rosform-problem", role: "alert" });
   const pointer = make("span", { class: "rosworld-pointer" });
   const id = newId();
@@ -49,7 +49,8 @@ function build(stage, first, send) {
         make("p", { class: "rosworld-help", id }, HELP),
         obstacles.element, problem),
       make("div", { class: "rosworld-right" },
-        facts.element, faults.element, make("h4", {}, "News"), news)),
+        facts.element, faults.element, make("p", { class: "rosworld-head" }, "News"),
+        make("div", { role: "log", "aria-label": "News" }, news))),
     make("details", {}, make("summary", {}, "What the topics carry"), topics.element),
   ));
   return {
@@ -122,7 +123,7 @@ function faultButtons(possible, act) {
   }, `${what} ${how}`));
   return {
     element: make("div", { class: "rosworld-faults", role: "group", "aria-label": "Faults" },
-      make("h4", {}, "Break something"), ...buttons),
+      make("p", { class: "rosworld-head" }, "Break something"), ...buttons),
     draw(frame) {
       faults = frame.faults;
       ways.forEach(({ what, how }, place) => press(buttons[place], faults[what] === how));
