@@ -7,15 +7,16 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from course.doctor.finding import HealthFinding, make_ok, make_problem, make_warning
-from course.runtime.domains.leases import MAX_DOMAIN, MIN_DOMAIN
+from course.runtime.domains import port_bases
+from course.runtime.domains.leases import describe_domains, usable_domains
+from course.runtime.domains.rtps_ports import LAST_DOMAIN
 
 RMW = "rmw_fastrtps_cpp"
 """The one middleware that there are wheels of."""
 
-_ENDS_THE_PROCESS = 233  # first domain id whose RTPS ports lie above 65535 (DDSI-RTPS 9.6.1.1)
 _RANGES = {"SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT"}
 _MARK = "_ROS_WHEELS_BOOTSTRAP_COMPLETE"
-_PROFILES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")
+_PROFILES = (port_bases.PROFILES_OF_3, port_bases.PROFILES)
 
 Environment = Mapping[str, str]
 
@@ -41,12 +42,12 @@ def _check_domain(environment: Environment) -> Iterator[HealthFinding]:
         return
     # A session leases a domain of its own, whatever stands here: only other programs follow it.
     note = "The course does not use it, but other ROS programs in this shell will not start well."
-    mend = f"Run `unset {name}`, or set it to a number from {MIN_DOMAIN} to {MAX_DOMAIN}."
+    mend = f"Run `unset {name}`, or set it to a number from {describe_domains()}."
     if not text.strip().isdecimal():
         yield make_warning(name, f"{text!r} is not a whole number. {note}", mend)
-    elif int(text) >= _ENDS_THE_PROCESS:
+    elif int(text) > LAST_DOMAIN:
         yield make_warning(name, f"{text} is too large. {note}", mend)
-    elif int(text) > MAX_DOMAIN:
+    elif int(text) not in usable_domains():
         yield make_warning(name, f"{text} can collide with other programs' ports on Linux.", mend)
 
 
@@ -90,6 +91,8 @@ def _check_security(environment: Environment) -> Iterator[HealthFinding]:
 def _check_profiles(environment: Environment) -> Iterator[HealthFinding]:
     for name in _PROFILES:
         path = environment.get(name, "")
+        if path == str(port_bases.PROFILE):  # the shell of a notebook with ports of its own
+            continue
         if path and not Path(path).is_file():
             yield make_problem(name, f"There is no file {path}.", f"Run `unset {name}`.")
         elif path:

@@ -13,7 +13,8 @@ from contextlib import ExitStack
 
 from course.doctor.finding import HealthFinding, make_ok, make_problem, make_warning
 from course.errors import DomainError
-from course.runtime.domains.leases import MAX_DOMAIN, MIN_DOMAIN, domains_in_use, lease_domain
+from course.runtime.domains import port_bases
+from course.runtime.domains.leases import free_domains, lease_domain
 from course.util.platform_check import WHEELS_ANEW, WHEELS_TORN
 
 DEADLINE_S = 40.0  # s for a probe, its imports included; it takes about 1 on an idle machine
@@ -23,7 +24,7 @@ _MULTICAST = ("239.255.0.1", 0)  # the group of DDSI-RTPS 9.6.1.4, on any free p
 
 def examine_ros() -> Iterator[HealthFinding]:
     """Yield what there is to say about the wheels, DDS and the domains."""
-    yield check_domains(domains_in_use())
+    yield check_domains(sum(len(free_domains(base)) for base in port_bases.known_bases()))
     yield check_multicast()
     if importlib.util.find_spec("rclpy") is None:
         yield make_problem("ROS 2 wheels", WHEELS_TORN, WHEELS_ANEW)
@@ -41,9 +42,8 @@ def examine_ros() -> Iterator[HealthFinding]:
     yield between_processes()
 
 
-def check_domains(in_use: set[int]) -> HealthFinding:
-    """Look how many domains are left for sessions, given those with open ports."""
-    free = len(set(range(MIN_DOMAIN + 1, MAX_DOMAIN + 1)) - in_use)
+def check_domains(free: int) -> HealthFinding:
+    """Judge how many domains are left for sessions."""
     mend = "Shut down notebooks and ROS programs that are no longer used."
     if not free:
         return make_problem("domains", "No ROS domain is free.", mend)
