@@ -2,8 +2,9 @@
 
 A domain is nothing but its ports. DDSI-RTPS 2.2, section 9.6.1.1, gives each 250 of them from 7400
 on, and ROS 2 looks for 32 participants on the first 74. In the other 176 there is room for four
-more domains of the same number, each with a port base of its own (`port_profile.xml`): up to ten
-participants, at ports where none of the others looks or listens.
+more domains of the same number, each with a port base of its own (`port_profile.xml`), at ports
+where none of the others looks or listens. Ten participants fit: numbered within a process, so ten
+open sessions in one kernel. An eleventh takes ports of the next domain, which then counts as taken.
 
 Linux hands out some ports to whoever asks for any, by default 32768 to 60999. That leaves the
 domains 0 to 101 and 215 to 232 (ROS 2 docs, "The ROS_DOMAIN_ID").

@@ -111,11 +111,10 @@ def test_one_domain_at_five_bases_is_five_domains() -> None:
     domains = [next(d for d in reversed(leases.free_domains()) if d < 100)]
     domains.append(next(d for d in leases.free_domains(BASES[-1]) if d > 214))
     places = [*((base, domains) for base in BASES), (BESIDE, domains)]
-    workers = [
+    found = listen(
         Worker(10 * number, 2, base=base, domains=ids)
         for number, (base, ids) in enumerate(places, 1)
-    ]
-    found = listen(workers)
+    )
     assert len(set(found["places"].values())) == 10
     for number, heard in found["heard"].items():
         shared = [n for n, place in found["places"].items() if place == found["places"][number]]
