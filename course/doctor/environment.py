@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping
+from importlib import metadata
 from pathlib import Path
 
+from course.doctor import ros_origin
 from course.doctor.finding import HealthFinding, make_ok, make_problem, make_warning
 from course.runtime.domains import port_bases
 from course.runtime.domains.leases import describe_domains, usable_domains
 from course.runtime.domains.rtps_ports import LAST_DOMAIN
 
 RMW = "rmw_fastrtps_cpp"
-"""The one middleware that there are wheels of."""
+"""The one middleware that there are wheels of, and that the course is made for."""
 
 _RANGES = {"SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT"}
 _MARK = "_ROS_WHEELS_BOOTSTRAP_COMPLETE"
@@ -55,7 +57,9 @@ def _check_middleware(environment: Environment) -> Iterator[HealthFinding]:
     name, chosen = "RMW_IMPLEMENTATION", environment.get("RMW_IMPLEMENTATION", "")
     if chosen and chosen != RMW:
         yield make_problem(
-            name, f"It asks for {chosen}, but only {RMW} is installed.", f"Run `unset {name}`."
+            name,
+            f"It asks for {chosen}, but the course runs on {RMW} only.",
+            f"Run `unset {name}`.",
         )
 
 
@@ -116,7 +120,7 @@ def _system_ros(environment: Environment) -> Iterator[HealthFinding]:
         for part in environment.get(name, "").split(os.pathsep)
         if part.startswith("/opt/ros/")
     ]
-    if places:
+    if places and _wheels_are_here():
         distribution = places[0].split("/")[3]
         yield make_warning(
             "sourced ROS",
@@ -126,10 +130,14 @@ def _system_ros(environment: Environment) -> Iterator[HealthFinding]:
         )
 
 
+def _wheels_are_here() -> bool:
+    return any(metadata.distributions(name=ros_origin.WHEEL))
+
+
 def _check_bootstrap(environment: Environment, prefix: str) -> Iterator[HealthFinding]:
     """The wheels set `_MARK` when they have set LD_LIBRARY_PATH; alone it was inherited."""
     paths = environment.get("LD_LIBRARY_PATH", "").split(os.pathsep)
-    if environment.get(_MARK) and str(Path(prefix) / "lib") not in paths:
+    if environment.get(_MARK) and _wheels_are_here() and str(Path(prefix) / "lib") not in paths:
         yield make_problem(
             _MARK,
             "It was inherited from another Python environment, so the ROS 2 wheels do not find "

@@ -97,10 +97,15 @@ def stale_segments(folder: Path, locks: Path) -> HealthFinding:
         held = {line.split()[5].rpartition(":")[2] for line in _lock_lines(locks)}
     except OSError as error:
         return make_ok(name, f"They could not be counted ({error.strerror or error})")
-    files = [path for path in folder.glob("fastrtps_*_el") if "port" not in path.name]
-    inodes = {path: str(found.st_ino) for path in files if (found := _stat_file(path))}
-    stale = [path for path, inode in inodes.items() if inode not in held]
-    parts = [_stat_file(part) for path in stale for part in folder.glob(f"{path.name[:-3]}*")]
+    files = [path for path in folder.glob("fastrtps_*") if "port" not in path.name]
+    inodes = {
+        path.name.removesuffix("_el"): str(found.st_ino)
+        for path in files
+        if path.name.endswith("_el") and (found := _stat_file(path))
+    }
+    stale = {name for name, inode in inodes.items() if inode not in held}
+    # A class that was killed leaves ten thousand: each is looked at once.
+    parts = [_stat_file(path) for path in files if _segment_of(path) in stale]
     size = sum(found.st_size for found in parts if found) >> 20
     if not stale:
         return make_ok(name, "none")
@@ -110,6 +115,11 @@ def stale_segments(folder: Path, locks: Path) -> HealthFinding:
         "programs that were killed.",
         "When no ROS program runs: rm -f /dev/shm/fastrtps_* /dev/shm/sem.fastrtps_*",
     )
+
+
+def _segment_of(path: Path) -> str:
+    """Return the segment that a file is a part of: ``fastrtps_0123`` of ``fastrtps_0123_el``."""
+    return "_".join(path.name.split("_")[:2])
 
 
 def _stat_file(path: Path) -> os.stat_result | None:

@@ -11,6 +11,7 @@ import socket
 import sys
 import threading
 import time
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
@@ -118,6 +119,30 @@ def new_socket() -> socket.socket:
 def bind_anywhere(sock: socket.socket) -> None:
     """Give a socket an address that the system chooses, for answers to what it sends."""
     sock.bind("" if is_linux() else (_LOOPBACK, 0))
+
+
+def try_lock(descriptor: int) -> bool:
+    """Lock an open file for this process, unless another one has it locked; return whether.
+
+    The lock ends with the process, or when the file is closed.
+    """
+    try:
+        import fcntl
+    except ImportError:  # no POSIX system: whoever comes last writes the same as the others
+        return True
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+def find_library(name: str, folders: Iterable[Path]) -> str:
+    """Return what to load a C library by; macOS wants its path, which is in one of ``folders``."""
+    if sys.platform != "darwin":
+        return f"lib{name}.so"
+    paths = (folder / f"lib{name}.dylib" for folder in folders)
+    return str(next((path for path in paths if path.exists()), f"lib{name}.dylib"))
 
 
 class ThreadSample(NamedTuple):

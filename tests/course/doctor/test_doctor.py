@@ -223,5 +223,5 @@ def test_the_command_sees_a_bootstrap_mark_from_elsewhere() -> None:
     done = run(_ROS_WHEELS_BOOTSTRAP_COMPLETE="1", LD_LIBRARY_PATH="")
     assert done.returncode == 1
     assert "problem  _ROS_WHEELS_BOOTSTRAP_COMPLETE: It was inherited" in done.stdout
-    assert "problem  ROS 2 wheels: rclpy cannot be imported" in done.stdout
+    assert "problem  ROS 2: rclpy cannot be imported" in done.stdout
     assert "Traceback" not in done.stdout
