@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from course.doctor.finding import HealthFinding, make_ok, make_problem, make_warning
-from course.util import cgroups
+from course.util import cgroups, operating_system
 
 MIN_DISK, LOW_DISK = 50, 500  # MB: below, a build fails; below, a class's submissions may
 LOW_SHM_MB = 32  # MB. A participant takes about 1 MB, and Docker gives 64 by default.
@@ -22,11 +22,13 @@ def examine_machine() -> Iterator[HealthFinding]:
     """Yield what there is to say about disk, shared memory, log folder and clock."""
     yield check_disk(Path.cwd())
     yield temporary_folder()
-    yield shared_memory(SHM)
-    yield stale_segments(SHM, Path("/proc/locks"))
+    if operating_system.is_linux():
+        yield shared_memory(SHM)
+        yield stale_segments(SHM, Path("/proc/locks"))
     yield log_folder(os.environ.get("ROS_LOG_DIR"), os.environ.get("ROS_HOME"))
     yield check_clock(time.time(), Path(__file__).stat().st_mtime)
-    yield check_counting(cgroups.delegated_group())
+    if operating_system.is_linux():
+        yield check_counting(cgroups.delegated_group())
 
 
 def check_counting(group: Path | None) -> HealthFinding:
