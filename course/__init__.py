@@ -97,7 +97,7 @@ def __getattr__(name: str) -> Any:
     """Import a public name when it is first used: rclpy takes a moment, and a supported platform.
 
     Raises:
-        UnsupportedPlatformError: there are no ROS 2 wheels for this machine.
+        UnsupportedPlatformError: there is no ROS 2 for this machine.
     """
     if name == "design":  # `course.design.carry(...)` needs no import of its own
         return importlib.import_module("course.design")

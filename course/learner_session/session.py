@@ -12,6 +12,7 @@ from rclpy.qos import QoSProfile
 from course.errors import SessionError
 from course.messages.types import load_type
 from course.runtime.core_session import CoreSession
+from course.runtime.domains.leases import require_reachable
 from course.runtime.requests.graph_queries import full_action, full_node, full_service
 from course.util import argument_checks
 from course.util.close_matches import close_match
@@ -223,6 +224,11 @@ class Session(CoreSession):
         except Exception:  # noqa: BLE001 - the session may end meanwhile; the wait has its own error
             return []
         return [f"{finding.message} {finding.mend}" for finding in found]
+
+    def _check_domain(self, domain_id: object) -> int:
+        domain = super()._check_domain(domain_id)
+        require_reachable(domain)
+        return domain
 
     def _type_of(self, what: str, name: str, known: list[tuple[str, list[str]]]) -> Any:
         types = dict(known)

@@ -14,9 +14,9 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+from course.runtime.domains.rtps_ports import DOMAIN_GAIN, USUAL_BASE
+
 FOLDER = Path("/dev/shm")
-FIRST_PORT, DOMAIN_GAIN = 7400, 250
-"""The first port of domain 0, and ports of a domain: DDSI-RTPS 2.2, section 9.6.1.1, PB and DG."""
 MAKING_S = 1.0
 """Seconds that making a port takes at most; it takes some microseconds."""
 
@@ -30,7 +30,7 @@ def remove_abandoned(domain_id: int, folder: Path = FOLDER) -> None:
     Another user's stay: DDS may not open them and goes on without. Other domains' ports are not
     looked at: where kernels are killed, there are thousands of them in time.
     """
-    first = FIRST_PORT + DOMAIN_GAIN * domain_id
+    first = USUAL_BASE + DOMAIN_GAIN * domain_id
     for port in range(first, first + 2 * DOMAIN_GAIN):  # the last participants' are the next one's
         path = folder / f"fastrtps_port{port}"
         with suppress(OSError):  # there is none; its maker has removed it, or is another user
