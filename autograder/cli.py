@@ -138,6 +138,35 @@ def grade(
 
 
 @app.command()
+def watch(
+    assignment: str,
+    root: Root = None,
+    every_s: Annotated[
+        float, typer.Option("--every", min=0.1, help="Seconds between two looks.")
+    ] = 60.0,
+    jobs: Jobs = IN_FLIGHT,
+    trust: Annotated[
+        bool,
+        typer.Option(
+            "--trust-submissions", help="Run them without a sandbox, with your own rights."
+        ),
+    ] = False,
+    scheduler: Annotated[str, typer.Option("--scheduler", help="As for `autograder grade`.")] = "",
+) -> None:
+    """Collect from nbgrader's exchange, grade what is new, release feedback; until it is stopped.
+
+    It says one line when something has happened, and nothing otherwise. Killed at any moment, it
+    goes on where it was when it is started again. You may grade by hand beside it.
+    """
+    from autograder.commands import watch_command
+
+    options = watch_command.GradingOptions(jobs, trust, scheduler)
+    watch_command.watch_assignment(
+        use_root(root), assignment, options, every_s=every_s, say=_line_printer(False)
+    )
+
+
+@app.command()
 def claim(
     assignment: str,
     student: str,
