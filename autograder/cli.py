@@ -167,6 +167,64 @@ def watch(
 
 
 @app.command()
+def collect(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE.zip",
+            help="What “Download all submissions” (Moodle) or “Download Submissions” (Canvas) "
+            "made.",
+        ),
+    ],
+    assignment: Annotated[
+        str, typer.Option("--assignment", help="If the names of the files do not say which it is.")
+    ] = "",
+    who: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--who",
+            metavar="NUMBER=STUDENT",
+            help="Whose the platform's number is, where the name does not say it; may be repeated.",
+        ),
+    ] = None,
+    root: Root = None,
+    as_json: AsJson = False,
+) -> None:
+    """Collect what students handed in on Moodle or Canvas, from the zip file downloaded there.
+
+    Who is meant is found by the students' names in nbgrader's gradebook (`nbgrader db student
+    import`), in Canvas also by the lms_user_id. Work that differs from what lies in submitted/
+    replaces it; the earlier one is kept beside it, as .ASSIGNMENT.replaced.
+    """
+    from autograder.gradebook.collecting.collect_zip import collect_zip
+    from autograder.gradebook.course_gradebook import CourseGradebook
+    from autograder.grading import engine
+    from course.messages.yaml_text import format_count
+
+    pairs = [one.partition("=") for one in who or ()]
+    if not all(number and student for number, _, student in pairs):
+        raise typer.BadParameter("as in 123456=ada", param_hint="--who")
+    where = use_root(root)
+    done = collect_zip(
+        CourseGradebook(where), file, assignment, {n: s for n, _, s in pairs},
+        lambda: engine.lock_course(where),
+    )  # fmt: skip
+    if as_json:
+        _print_json(vars(done))
+    else:
+        for sentence in (*done.problems, *done.remarks):
+            out.print(sentence, soft_wrap=True)
+        out.print(
+            f"{done.assignment}: {format_count(len(done.collected), 'submission')} collected "
+            f"({len(done.replaced)} in place of an earlier one), {len(done.unchanged)} as before, "
+            f"{len(done.problems)} not collected.",
+            soft_wrap=True,
+        )
+    if done.problems:
+        raise typer.Exit(EXIT_DIFFERENT)
+
+
+@app.command()
 def claim(
     assignment: str,
     student: str,
