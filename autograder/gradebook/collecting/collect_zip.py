@@ -1,7 +1,7 @@
 """``autograder collect``: hand-ins of a platform's zip file come into ``submitted/``.
 
-Each is unpacked beside, within the bounds that nbgrader has for a submission, and moved into place
-as a whole. What cannot be taken is said, a sentence each, and stops nobody else.
+Each is unpacked beside and moved into place as a whole. What cannot be taken is said, a sentence
+each, and stops nobody else.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from autograder.assignments.intake import roster
-from autograder.assignments.intake.handed_files import archives, download_names
-from autograder.assignments.intake.handed_files.file_names import join_names, printable_name
+from autograder.assignments.intake.handed_files import download_names
+from autograder.assignments.intake.handed_files.file_names import join_names
 from autograder.assignments.intake.handed_files.handed_in import is_junk
 from autograder.gradebook.collecting.exchange import COLLECTED, Hold
 from autograder.gradebook.collecting.matching import Student, match_students, read_students
@@ -25,12 +25,15 @@ from autograder.gradebook.collecting.platform_zip import (
     HandIn,
     open_download,
 )
+from autograder.gradebook.collecting.unpacking import (
+    NotTakenError,
+    check_bounds,
+    is_inside,
+    unpack_file,
+)
 from autograder.gradebook.course_gradebook import CourseGradebook
-from autograder.gradebook.staging import StagingLimits
-from autograder.util.work_files import MAX_DEPTH, MAX_FILES, walk_files
+from autograder.util.work_files import walk_files
 from course.util.close_matches import is_it
-
-MAX_NAME_BYTES = 255
 
 
 @dataclass(frozen=True)
@@ -54,10 +57,6 @@ class CollectedZip:
     unchanged: tuple[str, ...]
     problems: tuple[str, ...]
     remarks: tuple[str, ...]
-
-
-class _NotTakenError(Exception):
-    """One hand-in that is not collected; the message says why."""
 
 
 def collect_zip(
@@ -153,10 +152,10 @@ class _ZipIntake:
         place = roster.student_folder(self._root, student) / self._assignment
         try:
             files = self._places(one)
-            _check_bounds(files, self._limits)
+            check_bounds(files, self._limits)
             for name, entry in files.items():
-                _unpack(self._download.archive, entry, self._beside / name, name)
-        except _NotTakenError as error:
+                unpack_file(self._download.archive, entry, self._beside / name, name)
+        except NotTakenError as error:
             self._problems.append(f"{one} is not collected: {error}.")
             return
         finally:
@@ -194,60 +193,13 @@ class _ZipIntake:
         for place, entry in one.files.items():
             plain = download_names.first_name(place, self._notebooks)
             name = plain if plain not in one.files else place
-            if _is_inside(name):
+            if is_inside(name):
                 found[name] = entry
             else:
                 self._left_out.append(place)
         if not found:
-            raise _NotTakenError("there is no file in it")
+            raise NotTakenError("there is no file in it")
         return found
-
-
-def _is_inside(name: str) -> bool:
-    """Whether a name is a path below the folder that it is put in, on any system."""
-    parts = name.split("/")
-    return len(parts) <= MAX_DEPTH and all(
-        part not in ("", ".", "..")
-        and not set(part) & {"\\", "\0"}
-        and len(part.encode("utf-8", "surrogatepass")) <= MAX_NAME_BYTES
-        for part in parts
-    )
-
-
-def _check_bounds(files: Mapping[str, zipfile.ZipInfo], limits: StagingLimits) -> None:
-    if len(files) > MAX_FILES:
-        raise _NotTakenError(f"it has {len(files)} files, more than {MAX_FILES}")
-    for name, entry in files.items():
-        if entry.file_size > limits.max_file:
-            raise _NotTakenError(
-                f"{printable_name(name)} has {entry.file_size / 1e6:.0f} MB unpacked, more than "
-                f"the {limits.max_file / 1e6:.0f} MB that nbgrader takes "
-                "(CourseDirectory.max_file_size)"
-            )
-    unpacked = sum(entry.file_size for entry in files.values())
-    if unpacked > limits.max_all:
-        raise _NotTakenError(
-            f"it has {unpacked / 1e6:.0f} MB unpacked, more than the {limits.max_all / 1e6:.0f} MB "
-            "that nbgrader takes (CourseDirectory.max_dir_size)"
-        )
-
-
-def _unpack(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, path: Path, name: str) -> None:
-    """Write one file, no more of it than the archive says that there is."""
-    if entry.flag_bits & archives.ENCRYPTED_FLAG:
-        raise _NotTakenError(f"{printable_name(name)} is encrypted")
-    if entry.compress_type not in archives.METHODS:
-        raise _NotTakenError(f"{printable_name(name)} is packed in a way that is not read")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with archive.open(entry) as member, path.open("xb") as file:
-            shutil.copyfileobj(member, file)
-    except (FileExistsError, IsADirectoryError, NotADirectoryError):
-        raise _NotTakenError(f"{printable_name(name)} is a file and a folder in it") from None
-    except OSError:
-        raise  # no room, or no right to write there
-    except archives.DAMAGE as error:
-        raise _NotTakenError(f"{printable_name(name)} is damaged ({str(error)[:100]})") from None
 
 
 def _same_work(new: Path, place: Path) -> bool:
