@@ -505,6 +505,33 @@ def feedback(
 
 
 @app.command()
+def wheelhouse(
+    folder: Annotated[Path, typer.Argument(help="Such as a USB stick's.")],
+    wheel: Annotated[
+        Path | None,
+        typer.Option("--wheel", help="The course's own wheel, if it cannot be built here."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Make a folder from which the course installs without any network; its README.txt says how.
+
+    It has the wheels of the course, of ROS 2 and of all that they need, at the versions that were
+    tested, for this version of Python. Making it needs a network.
+    """
+    from autograder.commands import wheelhouse_command
+
+    done = wheelhouse_command.make_wheelhouse(folder, wheel, say=_line_printer(as_json))
+    if as_json:
+        _print_json(vars(done))
+    else:
+        out.print(
+            f"{done.count} wheels, {done.size / 1e6:.0f} MB: {done.folder}. How to install from "
+            f"them stands in {done.folder / wheelhouse_command.README}.",
+            soft_wrap=True,
+        )
+
+
+@app.command()
 def demo(
     folder: Annotated[
         Path, typer.Option("--dir", help="Where to work; an earlier demo there is replaced.")
