@@ -83,9 +83,11 @@ def watch_assignment(
 
     Raises:
         Stopped: by a signal; whatever was done is whole.
+        AssignmentError: it has not been released.
         BusyError: somebody else watches this assignment.
         CourseError: the first look failed; what fails later is said, and tried again.
     """
+    engine.released_notebooks(CourseGradebook(root), assignment)  # a name that is one, and no path
     woken = threading.Event()
     with _only_watch(root, assignment), Interruption(woken.set) as interruption:
         watch = _Watch(root, assignment, options, interruption, say)

@@ -103,7 +103,7 @@ def grade(
     """
     exercise_folders.use_course(root)
     gradebook = CourseGradebook(root, staged=STAGED)
-    names = _released_notebooks(gradebook, assignment)
+    names = released_notebooks(gradebook, assignment)
     known = gradebook.read_roster()
     students = sorted({known.student_id(name) for name in students})
     found, wrong = _submitted_students(gradebook, assignment, known, students)
@@ -169,8 +169,12 @@ def lock_course(root: Path) -> Iterator[None]:
         ) from None
 
 
-def _released_notebooks(gradebook: CourseGradebook, assignment: str) -> list[str]:
-    """Return the notebooks of a released assignment, or say what is missing."""
+def released_notebooks(gradebook: CourseGradebook, assignment: str) -> list[str]:
+    """Return the notebooks of a released assignment.
+
+    Raises:
+        AssignmentError: there is none of this name, or it has not been released.
+    """
     known = gradebook.assignment_names()
     released = gradebook.notebook_names(assignment) if assignment in known else []
     if not released:

@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 from filelock import FileLock
 
-from autograder.commands.watch_command import GradingOptions, _Watch
+from autograder.commands.watch_command import GradingOptions, _Watch, watch_assignment
 from autograder.corpus import Case
 from autograder.gradebook.collecting import exchange as exchange_module
 from autograder.gradebook.collecting.exchange_rights import ExchangeRightsError, require_exchange
@@ -25,14 +25,15 @@ from autograder.gradebook.collecting.placing import kept_folder
 from autograder.gradebook.course_gradebook import CourseGradebook, Grade
 from autograder.gradebook.release import make_release
 from autograder.grading import engine
+from autograder.grading.engine import AssignmentError
 from autograder.running.interruption import Interruption
 from tests.autograder.conftest import ASSIGNMENT, NOTEBOOK, Course
 from tests.exchange import COURSE, StudentExchange
 from tests.machine import needs_isolation
 
-pytestmark = [needs_isolation, pytest.mark.xdist_group("watch"), pytest.mark.timeout(900)]
+pytestmark = [needs_isolation, pytest.mark.xdist_group("watch"), pytest.mark.timeout(1800)]
 
-NIGHT_S = 400.0
+NIGHT_S = 800.0
 
 
 @pytest.fixture
@@ -315,3 +316,11 @@ def test_a_watch_without_an_exchange_ends_with_the_sentence(course: Course, tmp_
     assert done.returncode == 1
     [line] = done.stderr.splitlines()
     assert line.startswith(f"autograder: There is no exchange at {tmp_path / 'none'}: make it")
+
+
+@pytest.mark.parametrize("name", ["ch5", "..", "../submitted"])
+def test_a_watch_of_what_is_no_assignment_ends_with_the_sentence(course: Course, name: str) -> None:
+    course.submit("ada", "{")
+    with pytest.raises(AssignmentError, match="There is no assignment"):
+        watch_assignment(course.root, name, GradingOptions(2), say=str)
+    assert (course.folder("ada") / f"{NOTEBOOK}.ipynb").is_file()
