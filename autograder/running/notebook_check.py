@@ -19,6 +19,7 @@ from autograder.examination.verdict import Verdict
 from autograder.processes.channel import Channel
 from autograder.running.live_report import LiveReport
 from autograder.running.start import ExaminerProcess
+from autograder.sandbox.confinement.environment_variables import PROFILE
 from autograder.util import exercise_folders
 from course.errors import CourseError
 from course.runtime.core_session import CoreSession
@@ -89,7 +90,11 @@ def examine_part(
     try:
         ours, theirs = socket.socketpair()
         course = exercise_folders.current_exercises().root
-        with ours, ExaminerProcess(theirs, lease.domain_id, course=course) as examiner:
+        environment = {**PROFILE, **os.environ}  # else each new session is found after 0 to 3 s
+        with (
+            ours,
+            ExaminerProcess(theirs, lease.domain_id, env=environment, course=course) as examiner,
+        ):
             channel = Channel(ours)
             examiner.request(exam, [(part, key or {})], pid=os.getpid(), follows=True)
             sitting = _Sitting(examiner)

@@ -9,13 +9,16 @@ from pathlib import Path
 from autograder.sandbox.confinement import visible_files
 from course.interfaces.building import cache
 
+PROFILE = {"FASTRTPS_DEFAULT_PROFILES_FILE": str(Path(__file__).with_name("fastdds.xml"))}
+"""Makes Fast DDS less patient; the file says how, and why."""
+
 DDS = {
+    **PROFILE,
     # Two processes that share a network but not /dev/shm would find each other and then exchange
     # nothing: Fast DDS takes shared memory for granted on one host. LOCALHOST switches it back on.
     "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
     "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET",
     "COURSE_DISCOVERY": "inherit",
-    "FASTRTPS_DEFAULT_PROFILES_FILE": str(Path(__file__).with_name("fastdds.xml")),
 }
 INLINE = "module://matplotlib_inline.backend_inline"
 """Where plots go, as in a kernel: into the outputs of a cell."""
