@@ -38,6 +38,10 @@ A node that takes its time for each answer, and yet gives it, would keep the exa
 than it may take (`autograder.running.start.EXAM_TIMEOUT_S`), and that would be the grader's fault.
 """
 
+LEFT_PATIENCE = 0.125
+"""Share of the usual patience that a check has where one has failed on which it builds: it will
+hardly pass, and a stub has many of them."""
+
 MAX_NAME_BYTES = 200
 """Bytes that are shown of a name that is no text."""
 
@@ -271,6 +275,7 @@ class Exam(Generic[RigT]):
             else:
                 assert rig is not None  # without one, what needs nothing has failed already
                 bench.steps.clear()
+                bench.outside.patience = LEFT_PATIENCE if at_fault else 1.0
                 result = _run_check(check, rig, gone)
                 if result.status == "failed" and at_fault:
                     result = _not_checked(check, not_checked.needed_check(at_fault[0]))

@@ -41,7 +41,7 @@ class Patience:
         self._still = still
         self._began = time.monotonic()
         self._end = self._began + seconds
-        self._idle = idle
+        self._idle = idle * still.patience
         self._looked: float | None = None  # when all slept at the last look, else None
 
     @property

@@ -26,6 +26,8 @@ class Outside(Protocol):
     """Whether the network is the submission's alone, so that it may lose packets."""
     delay: RunDelay
     """For how long others have kept the subject from running."""
+    patience: float
+    """Share of the usual patience for what may never come; below 1 where it hardly will."""
 
     def ask(self, what: str, **given: Any) -> Any:
         """Return the answer to a request, as JSON knows it.
@@ -41,6 +43,7 @@ class Here:
     """Answers in this process, about another one: the kernel of a student's own."""
 
     own_network = False
+    patience = 1.0
 
     def __init__(self, pid: int) -> None:
         """Answer about the process ``pid``."""
@@ -58,6 +61,7 @@ class Afar:
     """Has a warden answer, over a channel."""
 
     own_network = True
+    patience = 1.0
 
     def __init__(self, connection: socket.socket) -> None:
         """Take ownership of the connection to it."""

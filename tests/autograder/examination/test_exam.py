@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from types import SimpleNamespace
@@ -82,7 +82,16 @@ def bench(*, ends: bool = False, left: Iterator[float] | None = None) -> CheckCo
     def deadline(_seconds: float) -> Deadline:
         return Deadline(left)
 
-    return cast(CheckContext, SimpleNamespace(ends=ends, key={}, deadline=deadline, steps=[]))
+    return cast(
+        CheckContext,
+        SimpleNamespace(
+            ends=ends,
+            key={},
+            deadline=deadline,
+            steps=[],
+            outside=SimpleNamespace(patience=1.0),
+        ),
+    )
 
 
 def sit(exam: Exam[list[str]], *parts: str) -> list[Verdict]:
@@ -358,3 +367,20 @@ def test_what_builds_on_a_check_that_failed_is_made_all_the_same_and_told_once(
     assert (second.status, third.status) == ("failed", status)
     assert third.points == (4.0 if status == "passed" else 0.0)
     assert third.actual == ("This needs “It runs” first." if fault else "")
+
+
+def test_a_check_that_builds_on_a_failed_one_is_made_with_little_patience(
+    exam: Exam[list[str]],
+) -> None:
+    examiner, had = bench(), dict[str, float]()
+
+    def note(name: str) -> Callable[[list[str]], None]:
+        return lambda _rig: had.update({name: examiner.outside.patience})
+
+    exam.checks["first"] = replace(exam.checks["first"], run=note("first"))
+    exam.checks["third"] = replace(
+        exam.checks["third"], needs=(), builds_on=("second",), run=note("third")
+    )
+    list(exam.sit([Part("visible")], examiner))
+    assert had["first"] == 1.0
+    assert 0 < had["third"] < 0.5

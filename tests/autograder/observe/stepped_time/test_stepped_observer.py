@@ -36,7 +36,7 @@ class FakeSession:
 
 def observer(source: Any, **options: Any) -> SteppedObserver:
     host = Host(FakeSession(), source, **options)  # type: ignore[arg-type]
-    still, node = SimpleNamespace(all_asleep=lambda: True), SimpleNamespace()
+    still, node = SimpleNamespace(all_asleep=lambda: True, patience=1.0), SimpleNamespace()
     return SteppedObserver(host, still, node)  # type: ignore[arg-type]
 
 
