@@ -100,11 +100,11 @@ class Simulation:
         )
         self._steps += 1
         if (moved := self.gripper.step(at_station=self._is_at_station())) is not None:
-            self._tell(f"The gripper {'closed' if moved else 'opened'}")
+            self.tell(f"The gripper {'closed' if moved else 'opened'}")
         if robot.touching != touched:
             self._events.append(("bumper", robot.touching))
             if robot.touching:
-                self._tell(f"The robot touched {self.floor.nearest_kind(robot.x, robot.y)}")
+                self.tell(f"The robot touched {self.floor.nearest_kind(robot.x, robot.y)}")
         self._shown.follow(robot.x, robot.y)
         return self._read_sensors()
 
@@ -151,14 +151,14 @@ class Simulation:
     def press_stop(self) -> None:
         """Press the emergency stop: the robot brakes, and takes no commands until the release."""
         if not self.robot.stopped:
-            self._tell("The emergency stop was pressed")
+            self.tell("The emergency stop was pressed")
         self.robot.stopped = True
         self._events.append(("emergency", "pressed"))
 
     def release_stop(self) -> None:
         """Release the emergency stop; the next command moves the robot again."""
         if self.robot.stopped:
-            self._tell("The emergency stop was released")
+            self.tell("The emergency stop was released")
             self.robot.drive(0.0, 0.0)
             self.robot.stopped = False
             self._events.append(("emergency", "released"))
@@ -199,7 +199,7 @@ class Simulation:
             self._events.append(("jammed", self.robot.jammed))
         elif what == "battery":
             self.robot.charge = LOW_CHARGE if state == "low" else 1.0
-        self._tell(f"Now {what}: {state},")
+        self.tell(f"Now {what}: {state},")
 
     def reset(self) -> None:
         """Begin anew: robot, people, noise, faults and time are as at first, obstacles are gone."""
@@ -233,7 +233,8 @@ class Simulation:
             "faults": dict(self.faults),
         }
 
-    def _tell(self, what: str) -> None:
+    def tell(self, what: str) -> None:
+        """Add to the news what has happened now."""
         self._shown.news.append(f"{what} at {self.time_s:.1f} s.")
 
     def _is_near(self, x: float, y: float) -> bool:

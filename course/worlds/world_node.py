@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,7 @@ from nav_msgs.msg import Odometry, Path
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.subscription import Subscription
 from sensor_msgs.msg import BatteryState, Image, Imu, LaserScan
 from std_msgs.msg import Bool, String
 from std_srvs.srv import SetBool, Trigger
@@ -47,6 +48,10 @@ _OUTPUTS: tuple[tuple[str, Any, QoSProfile | int, float], ...] = (
 _EVENTS = {"emergency": "emergency/stop", "bumper": "bumper", "jammed": "hardware/jammed"}
 
 
+Deliver = Callable[[str, Any], None]
+"""Takes the name of a sensor's topic and a message, in the world's thread: a cable."""
+
+
 @dataclass
 class _Topic:
     """A topic of the world: its rate in Hz (0 for events), and the last message or its maker."""
@@ -76,6 +81,9 @@ class WorldNode(Node):
         self._simulation = paced.simulation
         self._topics: dict[str, _Topic] = {}
         self._outputs: dict[str, Publisher] = {}
+        self._inputs: dict[str, Subscription] = {}
+        self._deliver: Deliver = _drop_message
+        self._cables: Collection[str] = ()
         for topic, msg_type, qos, rate in _OUTPUTS:
             self._outputs[topic] = publisher = self.create_publisher(msg_type, topic, qos)
             self._topics[topic] = _Topic(publisher.topic_name, msg_type, rate)
@@ -112,6 +120,26 @@ class WorldNode(Node):
                 topic = _EVENTS[kind]
                 self._publish(topic, self._topics[topic].msg_type(data=value))
 
+    def hand_over(self, deliver: Deliver, cables: Collection[str], motors: str) -> None:
+        """Leave the robot's topics to other nodes, which have its cables from now on.
+
+        Args:
+            deliver: gets what the world would publish.
+            cables: the topics whose messages are worth making; looked at each time.
+            motors: the topic that its motors hear, instead of ``cmd_vel``.
+        """
+        assert self.executor is not None
+        with self.executor.hold_still(), self._paced.lock:  # type: ignore[attr-defined]
+            self._deliver, self._cables = deliver, cables
+            for publisher in self._outputs.values():
+                self.destroy_publisher(publisher)
+            self._outputs.clear()
+            for topic, subscription in self._inputs.items():
+                del self._topics[topic]
+                self.destroy_subscription(subscription)
+            self._inputs.clear()
+            self._listen(Twist, motors, self._on_command)
+
     def describe_topics(self) -> list[dict[str, Any]]:
         """Return name, type, rate (Hz, 0 for what comes now and then) and last message of each."""
         return [topic.describe() for topic in self._topics.values()]
@@ -132,6 +160,7 @@ class WorldNode(Node):
 
         subscription = self.create_subscription(msg_type, topic, receive, 10)
         entry = self._topics[topic] = _Topic(subscription.topic_name, msg_type, 0.0)
+        self._inputs[topic] = subscription
 
     def _on_command(self, message: Twist) -> None:
         self._simulation.drive(message.linear.x, message.angular.z)
@@ -189,7 +218,7 @@ class WorldNode(Node):
             return
         imu = functools.partial(messages.make_imu, stamp_ns, readings.imu)
         if self._is_heard("imu/data"):  # at 100 Hz a message that nobody gets is worth saving
-            self._outputs["imu/data"].publish(imu())
+            self._publish("imu/data", imu())
         self._topics["imu/data"].last = imu
         if readings.scan is not None:
             period_s = SCAN_STEPS * STEP_S
@@ -205,8 +234,17 @@ class WorldNode(Node):
             self._publish("battery_state", state)
 
     def _is_heard(self, topic: str) -> bool:
-        return self._outputs[topic].get_subscription_count() > 0
+        if topic in self._outputs:
+            return self._outputs[topic].get_subscription_count() > 0
+        return topic in self._cables
 
     def _publish(self, topic: str, message: Any) -> None:
         self._topics[topic].last = message
-        self._outputs[topic].publish(message)
+        if topic in self._outputs:
+            self._outputs[topic].publish(message)
+        else:
+            self._deliver(topic, message)
+
+
+def _drop_message(_topic: str, _message: Any) -> None:
+    """Have no cables."""
