@@ -105,9 +105,10 @@ class Trip:
                     f"The robot arrived at {self._name} after {now - self._began:.1f} s."
                 )
                 self._world.tell(f"The robot arrived at {self._name}")
+                self._world.show_plans([], [])
             else:
                 self._describe_way(left, now)
-            self._show_plans(place)
+                self._show_plans(place)
         self._update_output()
 
     def _describe_way(self, left: float, now: float) -> None:
@@ -164,7 +165,8 @@ def _choose_shown(found: list[Place]) -> list[Place]:
     """Return some of what was found ahead and nearby, apart from each other, to be drawn."""
     shown: list[Place] = []
     for place in found:
-        near = place.x > 0.0 and math.hypot(place.x, place.y) < SHOWN_M and not place.far_only
+        ahead = place.x > abs(place.y) and not place.far_only
+        near = ahead and math.hypot(place.x, place.y) < SHOWN_M
         if near and all(distance_between(place, other) > APART_M for other in shown):
             shown.append(place)
     return shown
