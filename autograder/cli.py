@@ -54,13 +54,16 @@ def build(
 ) -> None:
     """Build the notebooks from their text sources."""
     from autograder import exercises
-    from autograder.assignments import listing
+    from autograder.assignments import chapter_sections, listing
     from autograder.assignments.build_notebooks import build as build_notebooks
 
     where = use_root(root)
     listed = {name for one in listing.of_course(where).values() for name in one.exercises}
     for name in sorted(listed):
         exercises.require_sound(name)
+    sections = chapter_sections.find_sections(where)
+    for name in sorted(listed & exercises.own_names()):
+        chapter_sections.require_sections(sections, name, exercises.where_to_read(name))
     for path in build_notebooks(where, check=check, with_solutions=with_solutions):
         out.print(str(path), soft_wrap=True)
     for name in sorted(exercises.own_names() - listed):
@@ -134,6 +137,93 @@ def grade(
         places = (where / "gradebook.db", where / "feedback", where / "grades.csv")
         out.print(f"Written: {', '.join(map(str, places))}", soft_wrap=True)
     if any(not graded.entered for graded in done):
+        raise typer.Exit(EXIT_DIFFERENT)
+
+
+@app.command()
+def watch(
+    assignment: str,
+    root: Root = None,
+    every_s: Annotated[
+        float, typer.Option("--every", min=0.1, help="Seconds between two looks.")
+    ] = 60.0,
+    jobs: Jobs = IN_FLIGHT,
+    trust: Annotated[
+        bool,
+        typer.Option(
+            "--trust-submissions", help="Run them without a sandbox, with your own rights."
+        ),
+    ] = False,
+    scheduler: Annotated[str, typer.Option("--scheduler", help="As for `autograder grade`.")] = "",
+) -> None:
+    """Collect from nbgrader's exchange, grade what is new, release feedback; until it is stopped.
+
+    It says one line when something has happened, and nothing otherwise. Killed at any moment, it
+    goes on where it was when it is started again. You may grade by hand beside it.
+    """
+    from autograder.commands import watch_command
+
+    options = watch_command.GradingOptions(jobs, trust, scheduler)
+    watch_command.watch_assignment(
+        use_root(root), assignment, options, every_s=every_s, say=_line_printer(False)
+    )
+
+
+@app.command()
+def collect(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE.zip",
+            help="What “Download all submissions” (Moodle) or “Download Submissions” (Canvas) "
+            "made.",
+        ),
+    ],
+    assignment: Annotated[
+        str, typer.Option("--assignment", help="If the names of the files do not say which it is.")
+    ] = "",
+    who: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--who",
+            metavar="NUMBER=STUDENT",
+            help="Whose the platform's number is, where the name does not say it; may be repeated.",
+        ),
+    ] = None,
+    root: Root = None,
+    as_json: AsJson = False,
+) -> None:
+    """Collect what students handed in on Moodle or Canvas, from the zip file downloaded there.
+
+    Who is meant is found by the students' names in nbgrader's gradebook (`nbgrader db student
+    import`), in Canvas also by the lms_user_id. Work that differs from what lies in submitted/
+    replaces it; the earlier one is kept beside it, as .ASSIGNMENT.replaced.
+    """
+    from autograder.gradebook.collecting.collect_zip import collect_zip
+    from autograder.gradebook.course_gradebook import CourseGradebook
+    from autograder.grading import engine
+    from course.messages.yaml_text import format_count
+
+    pairs = [one.partition("=") for one in who or ()]
+    if not all(number and student for number, _, student in pairs):
+        raise typer.BadParameter("as in 123456=ada", param_hint="--who")
+    where = use_root(root)
+    done = collect_zip(
+        CourseGradebook(where), file, assignment, {n: s for n, _, s in pairs},
+        lambda: engine.lock_course(where),
+    )  # fmt: skip
+    if as_json:
+        _print_json(vars(done))
+    else:
+        for sentence in (*done.problems, *done.remarks):
+            out.print(sentence, soft_wrap=True)
+        out.print(
+            f"{done.assignment}: {format_count(len(done.collected), 'submission')} collected "
+            f"({len(done.replaced)} in place of an earlier one), {len(done.unchanged)} as before, "
+            f"{len(done.problems)} not collected.",
+            soft_wrap=True,
+        )
+    if done.problems:
         raise typer.Exit(EXIT_DIFFERENT)
 
 
@@ -415,6 +505,33 @@ def feedback(
     )
     for why, who in packed.left_out.items():
         out.print(f"Not in it, {why}: {', '.join(who)}.", soft_wrap=True)
+
+
+@app.command()
+def wheelhouse(
+    folder: Annotated[Path, typer.Argument(help="Such as a USB stick's.")],
+    wheel: Annotated[
+        Path | None,
+        typer.Option("--wheel", help="The course's own wheel, if it cannot be built here."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Make a folder from which the course installs without any network; its README.txt says how.
+
+    It has the wheels of the course, of ROS 2 and of all that they need, at the versions that were
+    tested, for this version of Python. Making it needs a network.
+    """
+    from autograder.commands import wheelhouse_command
+
+    done = wheelhouse_command.make_wheelhouse(folder, wheel, say=_line_printer(as_json))
+    if as_json:
+        _print_json(vars(done))
+    else:
+        out.print(
+            f"{done.count} wheels, {done.size / 1e6:.0f} MB: {done.folder}. How to install from "
+            f"them stands in {done.folder / wheelhouse_command.README}.",
+            soft_wrap=True,
+        )
 
 
 @app.command()

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from course.errors import WaitTimeout as WaitTimeout
     from course.learner_session.default_session import call as call
     from course.learner_session.default_session import close as close
+    from course.learner_session.default_session import lives as lives
     from course.learner_session.default_session import logs as logs
     from course.learner_session.default_session import next_message as next_message
     from course.learner_session.default_session import pause as pause
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "call": "course.learner_session.default_session",
     "close": "course.learner_session.default_session",
+    "lives": "course.learner_session.default_session",
     "logs": "course.learner_session.default_session",
     "next_message": "course.learner_session.default_session",
     "pause": "course.learner_session.default_session",
@@ -95,7 +97,7 @@ def __getattr__(name: str) -> Any:
     """Import a public name when it is first used: rclpy takes a moment, and a supported platform.
 
     Raises:
-        UnsupportedPlatformError: there are no ROS 2 wheels for this machine.
+        UnsupportedPlatformError: there is no ROS 2 for this machine.
     """
     if name == "design":  # `course.design.carry(...)` needs no import of its own
         return importlib.import_module("course.design")

@@ -32,7 +32,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 CONSTRAINTS = (ROOT / ".ci" / "constraints.txt").read_text(encoding="utf-8").splitlines()
 HERE = {
     "system": "Linux", "machine": "x86_64", "implementation": "CPython", "version": (3, 12),
-    "libc": "glibc",
+    "libc": "glibc", "ros": False,
 }  # fmt: skip
 
 
@@ -86,7 +86,8 @@ def test_a_wheel_carries_what_the_commands_look_for(project: dict[str, Any]) -> 
     own = {n for n in notebooks - made_by_nbgrader if not n.startswith((".", "__"))} - {
         "grades.csv"
     }
-    assert {Path(path).name for path in included} == own
+    assert {Path(path).name for path in included if path.startswith("notebooks/")} == own
+    assert included.keys() - {f"notebooks/{name}" for name in own} == {".ci/constraints.txt"}
     for target in included.values():
         assert target.startswith("course/data/")
 
@@ -138,10 +139,12 @@ def test_copying_the_sources_says_what_is_wrong(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"system": "Darwin", "machine": "arm64"}, "not on Darwin arm64"),
-        ({"system": "Darwin"}, "not on Darwin x86_64"),
+        ({"system": "Darwin", "machine": "arm64"}, "not for Darwin arm64"),
+        ({"system": "Darwin"}, "not for Darwin x86_64"),
         ({"system": "Windows", "machine": "AMD64"}, "WSL 2"),
-        ({"machine": "aarch64"}, "not on Linux aarch64"),
+        ({"system": "Windows", "machine": "AMD64", "ros": True}, "WSL 2"),
+        ({"machine": "aarch64", "ros": True, "version": (3, 10)}, "not CPython 3.10"),
+        ({"machine": "aarch64"}, "not for Linux aarch64"),
         ({"libc": ""}, "glibc"),
         ({"version": (3, 10)}, "not CPython 3.10"),
         ({"version": (3, 15)}, "not CPython 3.15"),
@@ -161,6 +164,31 @@ def test_the_platforms_that_have_wheels_are_welcome(version: tuple[int, int]) ->
     require_supported_platform()
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"machine": "aarch64"},
+        {"system": "Darwin", "machine": "arm64", "libc": ""},
+        {"system": "Darwin", "libc": ""},
+        {"libc": ""},
+    ],
+)
+def test_a_ros_that_is_there_already_is_welcome_where_there_are_no_wheels(
+    change: dict[str, Any],
+) -> None:
+    assert find_problem(**{**HERE, **change, "ros": True}) is None
+
+
+def test_pip_asks_for_the_wheels_only_where_there_are_some(project: dict[str, Any]) -> None:
+    wheels = [r for r in requirements(project) if r.name.startswith("ros-")]
+    assert len(wheels) >= 10
+    here = {"sys_platform": "linux", "platform_machine": "x86_64"}
+    for change in ({}, {"platform_machine": "aarch64"}, {"sys_platform": "darwin"}):
+        for wheel in wheels:
+            assert wheel.marker is not None
+            assert wheel.marker.evaluate({**here, **change}) == (not change), (wheel, change)
+
+
 def test_the_platform_check_and_the_metadata_agree(project: dict[str, Any]) -> None:
     bounds = Requirement(f"python{project['project']['requires-python']}").specifier
     for minor in range(9, 18):
@@ -177,12 +205,13 @@ def run(code: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize("command", ["course", "autograder"])
 def test_a_command_on_a_foreign_platform_says_so_before_anything_is_imported(command: str) -> None:
     code = "import platform; platform.system = lambda: 'Darwin'\n"
+    code += "import course.util.platform_check as check; check.has_rclpy = lambda: False\n"
     code += f"from course.command_line.launch import {command}; {command}()"
     done = run(code)
     assert done.returncode == UnsupportedPlatformError.exit_code == 2
     assert done.stdout == ""
     [line] = done.stderr.splitlines()
-    assert line.startswith(f"{command}: This course runs on Linux x86-64 only")
+    assert line.startswith(f"{command}: There is no ROS 2 here")
 
 
 @pytest.mark.parametrize(
@@ -190,7 +219,7 @@ def test_a_command_on_a_foreign_platform_says_so_before_anything_is_imported(com
     [
         ("autograder", ["demo"], "autograder: "),
         ("course", ["lab", "there"], "course: "),
-        ("course", ["doctor"], "problem  ROS 2 wheels: "),
+        ("course", ["doctor"], "problem  ROS 2: "),
     ],
 )
 def test_a_command_without_rclpy_says_how_to_get_it_back(

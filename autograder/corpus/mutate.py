@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+
+from nbformat import NotebookNode
 
 from autograder import exercises
 from autograder.assignments import submission
 from autograder.assignments.cells import without_markers
 from autograder.corpus import trials
-from autograder.corpus.case import Case, solution_cell
+from autograder.corpus.case import Case
 from autograder.corpus.command import needs_trust
 from autograder.corpus.corpus_files import equivalent_mutations
 from autograder.corpus.mutations import Mutation, find_mutations
@@ -48,24 +50,23 @@ def mutate(exam: str, *, jobs: int = 2, say: Callable[[str], None] = lambda _lin
         CorpusError: its list of equivalent mutations is not well formed.
     """
     source, released = trials.make_notebooks(exercises.load_exam(exam).name)
-    grade_id = solution_cell(exam)
-    cells = {submission.grade_id(cell): cell.source for cell in source.cells}
-    exemplar = without_markers(cells[grade_id])
-    mutations = find_mutations(exemplar)
     reasons = equivalent_mutations(exam)
-    result = Mutated(stale=sorted(reasons.keys() - {mutation.key for mutation in mutations}))
-    result.equivalent.update({m: reasons[m.key] for m in mutations if m.key in reasons})
-    of_case = {
-        f"mutation-{number}": mutation
-        for number, mutation in enumerate(mutations)
-        if mutation not in result.equivalent
-    }
-    cases = [
-        Case(
-            exam, name, str(mutation), frozenset(), splices={grade_id: ((exemplar, mutation.text),)}
-        )
-        for name, mutation in of_case.items()
+    found = [
+        (grade_id, exemplar, mutation)
+        for grade_id, exemplar in _solutions(source)
+        for mutation in find_mutations(exemplar)
     ]
+    keys = {mutation.key for _, _, mutation in found}
+    result = Mutated(stale=sorted(reasons.keys() - keys))
+    result.equivalent.update({m: reasons[m.key] for _, _, m in found if m.key in reasons})
+    of_case: dict[str, Mutation] = {}
+    cases: list[Case] = []
+    for number, (grade_id, exemplar, mutation) in enumerate(found):
+        if mutation not in result.equivalent:
+            name = f"mutation-{number}"
+            of_case[name] = mutation
+            splices = {grade_id: ((exemplar, mutation.text),)}
+            cases.append(Case(exam, name, str(mutation), frozenset(), splices=splices))
 
     def note(trial: trials.CorpusTrial) -> None:
         mutation = of_case[trial.case.name]
@@ -77,5 +78,13 @@ def mutate(exam: str, *, jobs: int = 2, say: Callable[[str], None] = lambda _lin
         say(f"{'caught' if failed else 'SURVIVES'}  {mutation}")
 
     trials.run(cases, source, released, jobs=jobs, trust=needs_trust(say), done=note)
-    result.survivors.sort(key=lambda mutation: mutation.line)
+    places = [mutation for _, _, mutation in found]
+    result.survivors.sort(key=places.index)
     return result
+
+
+def _solutions(source: NotebookNode) -> Iterator[tuple[str, str]]:
+    """Yield the grade id and the text of each cell of code that a student writes."""
+    for cell in source.cells:
+        if cell.cell_type == "code" and submission.nbgrader_metadata(cell).get("solution"):
+            yield submission.grade_id(cell), without_markers(cell.source)

@@ -5,15 +5,15 @@ up left out, a reply that is not returned, a sleep in a callback, a callback gro
 moved. A mutation that an exam does not notice is a check that is missing, or changes nothing.
 
 Example:
-    >>> [str(m) for m in find_mutations("qos.depth = 5\\nself.timer.cancel()\\n")]
-    ['line 1, number: `qos.depth = 5` becomes `qos.depth = 6`', 'line 2, call left out: \
+    >>> [str(m) for m in find_mutations("self.rate = 5\\nself.timer.cancel()\\n")]
+    ['line 1, number: `self.rate = 5` becomes `self.rate = 6`', 'line 2, call left out: \
 `self.timer.cancel()` becomes `pass`']
 """
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 _OTHER_NAME = {
@@ -28,6 +28,14 @@ _OTHER_COMPARISON = {
     ast.Lt: "<=", ast.LtE: "<", ast.Gt: ">=", ast.GtE: ">", ast.Eq: "!=", ast.NotEq: "==",
     ast.Is: "is not", ast.IsNot: "is", ast.In: "not in", ast.NotIn: "in",
 }  # fmt: skip
+_SHALLOW, _DEEP = 1, 100
+"""Depths of a queue that hold one message, and more than any is worth keeping of."""
+_OF_ENDPOINTS: dict[str, dict[int, tuple[int, ...]]] = {
+    "create_publisher": {2: ()},
+    "create_lifecycle_publisher": {2: ()},
+    "create_subscription": {3: (_SHALLOW,)},
+}
+"""Where the depth stands among the arguments, and what it may wrongly be."""
 _SLEEP_S = 2.0
 """Seconds that a callback sleeps: longer than a node may be held up in any task."""
 
@@ -39,12 +47,14 @@ class Mutation:
     Attributes:
         operator: the kind of mistake.
         line: where it is, from 1 on.
+        scope: the function in which it is, or what is assigned outside of any, or an empty text.
         before: the line as it was, and ``after``: as it is now, both without indentation.
         text: all of the solution with the mistake.
     """
 
     operator: str
     line: int
+    scope: str
     before: str
     after: str
     text: str
@@ -52,7 +62,8 @@ class Mutation:
     @property
     def key(self) -> str:
         """What names it where a corpus says that it changes nothing: no number of a line."""
-        return f"{self.operator}: {self.before} -> {self.after}"
+        where = f" in {self.scope}" if self.scope else ""
+        return f"{self.operator}{where}: {self.before} -> {self.after}"
 
     def __str__(self) -> str:
         """Return it as a phrase."""
@@ -70,17 +81,21 @@ def find_mutations(text: str) -> list[Mutation]:
         SyntaxError: the solution does not compile.
     """
     tree = ast.parse(text)
+    unused = {node for body in _bodies(tree) for node in _overwritten(body)}
+    scopes = _scopes(tree)
     found: dict[str, Mutation] = {}
-    for operator in (_names, _numbers, _booleans, _comparisons, _conditions, _calls, _returns,
-                     _groups, _sleeps):  # fmt: skip
+    for operator in (_names, _depths, _numbers, _booleans, _comparisons, _conditions, _calls,
+                     _returns, _groups, _sleeps):  # fmt: skip
         for edit in operator(tree):
-            mutation = _apply(text, *edit)
+            mutation = None if edit[1] in unused else _apply(text, scopes, *edit)
             if mutation is not None:
                 found.setdefault(mutation.text, mutation)
     return sorted(found.values(), key=lambda mutation: (mutation.line, mutation.operator))
 
 
-def _apply(text: str, operator: str, node: ast.AST, new: str) -> Mutation | None:
+def _apply(
+    text: str, scopes: Mapping[ast.AST, str], operator: str, node: ast.AST, new: str
+) -> Mutation | None:
     assert isinstance(node, ast.expr | ast.stmt | ast.keyword)
     lines = text.splitlines(keepends=True)
     begin = _offset(lines, node.lineno, node.col_offset)
@@ -93,13 +108,51 @@ def _apply(text: str, operator: str, node: ast.AST, new: str) -> Mutation | None
     if mutated == text:
         return None
     after = mutated[text.rfind("\n", 0, begin) + 1 :].split("\n", 1)[0].strip()
-    return Mutation(operator, node.lineno, lines[node.lineno - 1].strip(), after, mutated)
+    if "\n" in new:  # a line of its own before the one that was there
+        after += f"; {lines[node.lineno - 1].strip()}"
+    before, scope = lines[node.lineno - 1].strip(), scopes.get(node, "")
+    return Mutation(operator, node.lineno, scope, before, after, mutated)
 
 
 def _offset(lines: list[str], line: int, column: int) -> int:
     """Return the place in the text of a column that Python counts in bytes of UTF-8."""
     before = sum(map(len, lines[: line - 1]))
     return before + len(lines[line - 1].encode()[:column].decode())
+
+
+def _scopes(tree: ast.Module) -> dict[ast.AST, str]:
+    named: list[tuple[str, ast.AST]] = [
+        (name, statement) for statement in tree.body if (name := _defined_name(statement))
+    ]
+    named += [(function.name, function) for function in _functions(tree)]
+    return {inner: name for name, whole in named for inner in ast.walk(whole)}  # inmost last
+
+
+def _bodies(tree: ast.Module) -> Iterator[list[ast.stmt]]:
+    yield tree.body
+    yield from (function.body for function in _functions(tree))
+
+
+def _overwritten(body: list[ast.stmt]) -> set[ast.AST]:
+    """Return all that stands in definitions which another one in the same row replaces unused."""
+    unused: set[ast.AST] = set()
+    pending: dict[str, ast.stmt] = {}
+    for statement in body:
+        for node in ast.walk(statement):
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
+                pending.pop(node.id, None)
+        if name := _defined_name(statement):
+            unused.update(ast.walk(pending[name]) if name in pending else ())
+            pending[name] = statement
+    return unused
+
+
+def _defined_name(statement: ast.stmt) -> str | None:
+    if isinstance(statement, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+        return statement.name
+    if isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name):
+        return statement.targets[0].id
+    return None
 
 
 def _names(tree: ast.AST) -> Iterator[_Edit]:
@@ -111,8 +164,37 @@ def _names(tree: ast.AST) -> Iterator[_Edit]:
             yield "other callback group", node, _OTHER_NAME[node.id]
 
 
-def _numbers(tree: ast.AST) -> Iterator[_Edit]:
+def _depths(tree: ast.AST) -> Iterator[_Edit]:
+    for number, depths in _find_depths(tree).items():
+        for depth in depths:
+            yield "depth of a queue", number, str(depth)
+
+
+def _find_depths(tree: ast.AST) -> dict[ast.Constant, tuple[int, ...]]:
+    """Return what a depth of a queue may wrongly be: that of a profile, or of an endpoint.
+
+    An endpoint that just says 10 means no more than that its queue is not short.
+    """
+    found: dict[ast.Constant, tuple[int, ...]] = {}
     for node in ast.walk(tree):
+        if not isinstance(node, ast.Call):
+            continue
+        for word in node.keywords:
+            if word.arg == "depth" and isinstance(word.value, ast.Constant):
+                found[word.value] = (_SHALLOW, _DEEP)
+        called = ast.unparse(node.func).rpartition(".")[2]
+        for place, depths in _OF_ENDPOINTS.get(called, {}).items():
+            for value in node.args[place : place + 1]:
+                if isinstance(value, ast.Constant):
+                    found[value] = depths
+    return found
+
+
+def _numbers(tree: ast.AST) -> Iterator[_Edit]:
+    depths = _find_depths(tree)
+    for node in ast.walk(tree):
+        if node in depths:
+            continue
         if isinstance(node, ast.Constant) and type(node.value) is int:
             yield "number", node, str(node.value + 1)
         elif isinstance(node, ast.Constant) and type(node.value) is float:
@@ -172,7 +254,9 @@ def _groups(tree: ast.AST) -> Iterator[_Edit]:
 
 def _sleeps(tree: ast.AST) -> Iterator[_Edit]:
     sleep = f"__import__('time').sleep({_SLEEP_S:g})"
-    for node in _functions(tree, lambda name: not name.startswith("__")):
+    for node in _functions(tree):
+        if node.name.startswith("__"):
+            continue
         first = node.body[0]
         indent = " " * first.col_offset
         whole = "\n".join(
@@ -182,9 +266,7 @@ def _sleeps(tree: ast.AST) -> Iterator[_Edit]:
         yield "sleep in a callback", first, f"{sleep}\n{indent}{whole}"
 
 
-def _functions(
-    tree: ast.AST, wanted: Callable[[str], bool]
-) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
+def _functions(tree: ast.AST) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
     for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and wanted(node.name):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             yield node

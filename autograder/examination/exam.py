@@ -298,10 +298,8 @@ def _shorten_text(text: str) -> str:
 
 
 def _result_of(check: Check[RigT], status: Status) -> CheckResult:
-    return CheckResult(
-        check.name, check.title, status, 0.0, 0.0,
-        rationale=check.rationale, hints=check.hints, read=check.read,
-    )  # fmt: skip
+    """Return a result without what leads to the mend: that belongs to a check that failed."""
+    return CheckResult(check.name, check.title, status, 0.0, 0.0)
 
 
 def _not_checked(check: Check[RigT], reason: str) -> CheckResult:
@@ -358,7 +356,10 @@ def _student_failure(check: Check[RigT], error: StudentError | SubjectGone) -> C
 
 
 def _failed_result(check: Check[RigT], expected: str, actual: str) -> CheckResult:
-    return replace(_result_of(check, "failed"), expected=expected, actual=actual)
+    return replace(
+        _result_of(check, "failed"), expected=expected, actual=actual,
+        rationale=check.rationale, hints=check.hints, read=check.read,
+    )  # fmt: skip
 
 
 def _read_by_ros(error: BaseException) -> bool:

@@ -32,9 +32,11 @@ class VerdictError(CourseError):
 class CheckResult:
     """The outcome of one check.
 
-    ``points`` is what was earned of ``max_points``. ``rationale`` says why the behaviour matters
-    on a robot, ``expected`` and ``actual`` what was needed and what was observed, ``hints`` lead to
-    the mend step by step, ``read`` names where to read more, ``note`` is a remark on a pass.
+    ``points`` is what was earned of ``max_points``. ``expected`` and ``actual`` are what was needed
+    and what was observed; ``actual`` of a check that was not made says why not. ``rationale`` says
+    why the behaviour matters on a robot, ``hints`` lead to the mend step by step, ``read`` names
+    where to read more: only of a check that failed, as what was not examined gives nothing away.
+    ``note`` is a remark on a pass.
     ``steps`` are what the examiner did and saw: for the author of the exam, not for students.
     ``picture`` shows a sequence in time or over rounds that was wrong.
     """

@@ -66,6 +66,13 @@ def require_sound(name: str) -> None:
         load_exam(name).require_points()
 
 
+def where_to_read(name: str) -> dict[str, str]:
+    """Return where each check of an exercise's exam says to read on; {} if it has no checks."""
+    if not points.table()[name].parts:
+        return {}
+    return {check.name: check.read for check in load_exam(name).checks.values()}
+
+
 def require_exercise(name: str) -> None:
     """Raise ExamError if there is no exercise called ``name``; it names the ones there are."""
     if name not in exercise_names():

@@ -9,7 +9,7 @@ import re
 import sys
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,6 +18,7 @@ from typing import Any
 from nbgrader.api import Gradebook, MissingEntry
 from nbgrader.apps import NbGraderAPI
 from nbgrader.coursedir import CourseDirectory
+from nbgrader.exchange.default import ExchangeCollect
 from sqlalchemy.exc import SQLAlchemyError
 from traitlets.config import Config
 from traitlets.config.loader import PyFileConfigLoader
@@ -151,6 +152,29 @@ class CourseGradebook:
         options = {"force": True}
         method = self._api.generate_feedback
         self._call_nbgrader(method, assignment, student, options=options, of_one_pass=True)
+
+    def collect(
+        self, assignment: str, folder: str, make_collector: Callable[[type], type[Any]]
+    ) -> None:
+        """Collect what is newer in the exchange, into ``folder`` in place of ``submitted``.
+
+        ``make_collector`` gets nbgrader's own collector, and returns the one to use; a plugin that
+        the course's configuration names is used as it is. Raises as `autograde` does.
+        """
+        exchange, before = self._api.exchange, self.coursedir.submitted_directory
+        configured = exchange.collect
+        if configured is ExchangeCollect:
+            exchange.collect = make_collector(configured)
+        self.coursedir.submitted_directory = folder
+        try:
+            self._call_nbgrader(self._api.collect, assignment, options={"update": True})
+        finally:
+            self.coursedir.submitted_directory = before
+            exchange.collect = configured
+
+    def release_feedback(self, assignment: str, student: str) -> None:
+        """Put one student's feedback into the exchange; raises as `autograde` does."""
+        self._call_nbgrader(self._api.release_feedback, assignment, student, options={})
 
     def assignment_names(self) -> list[str]:
         """Return the assignments that have been released into the gradebook."""

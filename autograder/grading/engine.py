@@ -32,7 +32,9 @@ from autograder.util import exercise_folders, work_files
 from course.errors import CourseError
 from course.util.close_matches import is_it
 
-__all__ = ["AssignmentError", "BusyError", "Graded", "grade"]
+__all__ = [
+    "AssignmentError", "BusyError", "Graded", "NobodySubmittedError", "grade", "lock_course",
+]  # fmt: skip
 
 STAGED = f"{autograde_steps.WORK_FOLDER}/staged"
 LOCK = f"{autograde_steps.WORK_FOLDER}/engine.lock"
@@ -45,6 +47,10 @@ EXCLUDED = (
 
 class AssignmentError(CourseError):
     """An assignment that does not exist or is not ready; the message names what there is."""
+
+
+class NobodySubmittedError(AssignmentError):
+    """Nobody has submitted the assignment yet."""
 
 
 class BusyError(CourseError):
@@ -97,7 +103,7 @@ def grade(
     """
     exercise_folders.use_course(root)
     gradebook = CourseGradebook(root, staged=STAGED)
-    names = _released_notebooks(gradebook, assignment)
+    names = released_notebooks(gradebook, assignment)
     known = gradebook.read_roster()
     students = sorted({known.student_id(name) for name in students})
     found, wrong = _submitted_students(gradebook, assignment, known, students)
@@ -110,7 +116,7 @@ def grade(
     found = [s for s in found if s not in gradebook.excluded_students]
     store = OutcomeStore(root / autograde_steps.WORK_FOLDER, trust=trust, hidden=[root])
     with ExitStack() as stack:
-        stack.enter_context(_lock_course(root))
+        stack.enter_context(lock_course(root))
         stack.callback(progress.end)
         work_files.sweep_scratch()
         workers = stack.enter_context(_make_workers(jobs, store, trust, scheduler, root, progress))
@@ -145,8 +151,12 @@ def _make_workers(
 
 
 @contextmanager
-def _lock_course(root: Path) -> Iterator[None]:
-    """Hold the course for this engine; the kernel lets it go when the process ends, however."""
+def lock_course(root: Path) -> Iterator[None]:
+    """Hold the course for the block; the kernel lets it go when the process ends, however.
+
+    Raises:
+        BusyError: another process holds it.
+    """
     path = root / LOCK
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
@@ -159,8 +169,12 @@ def _lock_course(root: Path) -> Iterator[None]:
         ) from None
 
 
-def _released_notebooks(gradebook: CourseGradebook, assignment: str) -> list[str]:
-    """Return the notebooks of a released assignment, or say what is missing."""
+def released_notebooks(gradebook: CourseGradebook, assignment: str) -> list[str]:
+    """Return the notebooks of a released assignment.
+
+    Raises:
+        AssignmentError: there is none of this name, or it has not been released.
+    """
     known = gradebook.assignment_names()
     released = gradebook.notebook_names(assignment) if assignment in known else []
     if not released:
@@ -197,7 +211,7 @@ def _submitted_students(
                 f"is no folder {gradebook.root / 'submitted' / student / assignment}."
             )
     if not students and not wrong:
-        raise AssignmentError(
+        raise NobodySubmittedError(
             f"Nobody has submitted '{assignment}' yet: nbgrader expects the files in "
             f"{gradebook.root / 'submitted'}/<student>/{assignment}/."
         )

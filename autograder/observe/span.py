@@ -16,7 +16,7 @@ from autograder.observe.findings import rate_picture, with_picture
 from autograder.observe.nouns import Topic
 from autograder.observe.phrases import capitalize_first
 
-PACES = (0.6, 2.0)
+PACES = (0.6, 1.5)
 """Seconds of wall time in which a second of the node's time passes, where a rate is taken again.
 
 A thread that looks at the clock now and then loses what it sees too late, where time jumps. Neither

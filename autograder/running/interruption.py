@@ -37,6 +37,10 @@ class Interruption:
         self._signum = 0
         self._before: dict[int, Any] = {}
 
+    def is_stopped(self) -> bool:
+        """Whether a signal came."""
+        return self._signum != 0
+
     def raise_if_stopped(self) -> None:
         """Raise `Stopped` if a signal came."""
         if self._signum:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 import shlex
 import shutil
 import socket
@@ -57,6 +58,20 @@ class Abilities:
         return "sandboxed" if self.loss else "sandboxed without loss"
 
 
+def platform_problem(system: str = sys.platform, machine: str | None = None) -> str:
+    """Return why submissions cannot be graded on this kind of machine; empty if they can.
+
+    What is refused to a submission, and how it is watched, is written for this system's calls.
+    """
+    machine = machine or platform.machine()
+    if system == "linux" and machine.lower() in ("x86_64", "amd64"):
+        return ""
+    return (
+        f"Submissions are graded on Linux x86-64 only, not on {system} {machine}: grade on such a "
+        "machine; notebooks and their check cells run here."
+    )
+
+
 _trying = threading.Lock()
 
 
@@ -68,6 +83,8 @@ def abilities() -> Abilities:
 
 @cache
 def _probe_abilities() -> Abilities:
+    if problem := platform_problem():
+        return Abilities(problem)
     missing = list(dict.fromkeys(TOOLS[tool] for tool in TOOLS if shutil.which(tool) is None))
     if missing:
         packages = " ".join(sorted({*missing, "bubblewrap", "iproute2", "nftables"}))
@@ -114,8 +131,10 @@ def choose_isolation(
         exams: the files of exams that only a course root has, by path in it, for the examiner.
 
     Raises:
-        SandboxError: it is not trusted, and there is no working sandbox here.
+        SandboxError: nothing is graded here, or it is not trusted and there is no sandbox.
     """
+    if problem := platform_problem():
+        raise SandboxError(problem)
     if trust:
         return Unsandboxed(exams)
     require_sandbox()

@@ -1,13 +1,13 @@
 """Entry points of the two commands: look at the platform first, then import the rest.
 
-On a platform without ROS 2 wheels the import itself would fail, in a traceback.
+On a platform without ROS 2 the import itself would fail, in a traceback.
 """
 
 from __future__ import annotations
 
 import atexit
 import gc
-import importlib.util
+import importlib
 import os
 import signal
 import sys
@@ -16,6 +16,7 @@ from course.util.platform_check import (
     WHEELS_ANEW,
     WHEELS_TORN,
     UnsupportedPlatformError,
+    has_rclpy,
     require_supported_platform,
 )
 
@@ -42,7 +43,7 @@ def _run_command(name: str, module: str) -> None:
     os.environ["PATH"] = os.pathsep.join([scripts, os.environ.get("PATH", os.defpath)])
     _collect_garbage_seldom()
     # Checked here, before the command has begun. The doctor reports it in its own way.
-    if importlib.util.find_spec("rclpy") is None and sys.argv[1:2] != ["doctor"]:
+    if not has_rclpy() and sys.argv[1:2] != ["doctor"]:
         sys.stderr.write(f"{name}: {WHEELS_TORN} {WHEELS_ANEW}\n")
         sys.exit(2)
     try:

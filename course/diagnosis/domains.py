@@ -10,7 +10,7 @@ from course.doctor.finding import HealthFinding, make_problem, make_warning
 from course.graph import reader
 from course.runtime.context import close_order
 from course.runtime.core_session import CoreSession
-from course.runtime.domains import domain_discovery
+from course.runtime.domains import domain_discovery, port_bases
 from course.runtime.requests.actions import SEND_GOAL
 
 
@@ -58,6 +58,11 @@ def next_door(session: CoreSession, sought: str = "") -> Iterator[HealthFinding]
                 "domain", f"{action} is offered by {', '.join(nodes)} on domain "
                 f"{other.domain_id}, in {other.program}; this session is on domain "
                 f"{session.domain_id}, and DDS domains never hear each other.",
-                f"Join that domain: course.close(), then course.session(domain_id="
-                f"{other.domain_id}).",
+                _how_to_join(other),
             )  # fmt: skip
+
+
+def _how_to_join(other: domain_discovery.OtherSession) -> str:
+    if other.port_base != port_bases.current_base():  # as many sessions run on this machine
+        return "They have ports of their own, too: put the nodes of both into one notebook."
+    return f"Join that domain: course.close(), then course.session(domain_id={other.domain_id})."

@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 
-from course.doctor import environment, machine, ros, software
+from course.doctor import environment, machine, ros, software, surroundings
 from course.doctor.finding import HealthFinding, make_problem
 from course.errors import CourseError
 
@@ -18,6 +18,7 @@ def examine_all() -> Iterator[HealthFinding]:
     parts = (
         software.examine_software,
         lambda: environment.examine_environment(os.environ, sys.prefix),
+        surroundings.examine_surroundings,
         machine.examine_machine,
         ros.examine_ros,
     )

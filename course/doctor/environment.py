@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping
+from importlib import metadata
 from pathlib import Path
 
+from course.doctor import ros_origin
 from course.doctor.finding import HealthFinding, make_ok, make_problem, make_warning
-from course.runtime.domains.leases import MAX_DOMAIN, MIN_DOMAIN
+from course.runtime.domains import port_bases
+from course.runtime.domains.leases import describe_domains, usable_domains
+from course.runtime.domains.rtps_ports import LAST_DOMAIN
 
 RMW = "rmw_fastrtps_cpp"
-"""The one middleware that there are wheels of."""
+"""The one middleware that there are wheels of, and that the course is made for."""
 
-_ENDS_THE_PROCESS = 233  # first domain id whose RTPS ports lie above 65535 (DDSI-RTPS 9.6.1.1)
 _RANGES = {"SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT"}
 _MARK = "_ROS_WHEELS_BOOTSTRAP_COMPLETE"
-_PROFILES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")
+_PROFILES = (port_bases.PROFILES_OF_3, port_bases.PROFILES)
 
 Environment = Mapping[str, str]
 
@@ -41,12 +44,12 @@ def _check_domain(environment: Environment) -> Iterator[HealthFinding]:
         return
     # A session leases a domain of its own, whatever stands here: only other programs follow it.
     note = "The course does not use it, but other ROS programs in this shell will not start well."
-    mend = f"Run `unset {name}`, or set it to a number from {MIN_DOMAIN} to {MAX_DOMAIN}."
+    mend = f"Run `unset {name}`, or set it to a number from {describe_domains()}."
     if not text.strip().isdecimal():
         yield make_warning(name, f"{text!r} is not a whole number. {note}", mend)
-    elif int(text) >= _ENDS_THE_PROCESS:
+    elif int(text) > LAST_DOMAIN:
         yield make_warning(name, f"{text} is too large. {note}", mend)
-    elif int(text) > MAX_DOMAIN:
+    elif int(text) not in usable_domains():
         yield make_warning(name, f"{text} can collide with other programs' ports on Linux.", mend)
 
 
@@ -54,7 +57,9 @@ def _check_middleware(environment: Environment) -> Iterator[HealthFinding]:
     name, chosen = "RMW_IMPLEMENTATION", environment.get("RMW_IMPLEMENTATION", "")
     if chosen and chosen != RMW:
         yield make_problem(
-            name, f"It asks for {chosen}, but only {RMW} is installed.", f"Run `unset {name}`."
+            name,
+            f"It asks for {chosen}, but the course runs on {RMW} only.",
+            f"Run `unset {name}`.",
         )
 
 
@@ -90,6 +95,8 @@ def _check_security(environment: Environment) -> Iterator[HealthFinding]:
 def _check_profiles(environment: Environment) -> Iterator[HealthFinding]:
     for name in _PROFILES:
         path = environment.get(name, "")
+        if path == str(port_bases.PROFILE):  # the shell of a notebook with ports of its own
+            continue
         if path and not Path(path).is_file():
             yield make_problem(name, f"There is no file {path}.", f"Run `unset {name}`.")
         elif path:
@@ -113,7 +120,7 @@ def _system_ros(environment: Environment) -> Iterator[HealthFinding]:
         for part in environment.get(name, "").split(os.pathsep)
         if part.startswith("/opt/ros/")
     ]
-    if places:
+    if places and _wheels_are_here():
         distribution = places[0].split("/")[3]
         yield make_warning(
             "sourced ROS",
@@ -123,10 +130,14 @@ def _system_ros(environment: Environment) -> Iterator[HealthFinding]:
         )
 
 
+def _wheels_are_here() -> bool:
+    return any(metadata.distributions(name=ros_origin.WHEEL))
+
+
 def _check_bootstrap(environment: Environment, prefix: str) -> Iterator[HealthFinding]:
     """The wheels set `_MARK` when they have set LD_LIBRARY_PATH; alone it was inherited."""
     paths = environment.get("LD_LIBRARY_PATH", "").split(os.pathsep)
-    if environment.get(_MARK) and str(Path(prefix) / "lib") not in paths:
+    if environment.get(_MARK) and _wheels_are_here() and str(Path(prefix) / "lib") not in paths:
         yield make_problem(
             _MARK,
             "It was inherited from another Python environment, so the ROS 2 wheels do not find "

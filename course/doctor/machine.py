@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from course.doctor.finding import HealthFinding, make_ok, make_problem, make_warning
-from course.util import cgroups
+from course.util import cgroups, operating_system
 
 MIN_DISK, LOW_DISK = 50, 500  # MB: below, a build fails; below, a class's submissions may
 LOW_SHM_MB = 32  # MB. A participant takes about 1 MB, and Docker gives 64 by default.
@@ -22,11 +22,13 @@ def examine_machine() -> Iterator[HealthFinding]:
     """Yield what there is to say about disk, shared memory, log folder and clock."""
     yield check_disk(Path.cwd())
     yield temporary_folder()
-    yield shared_memory(SHM)
-    yield stale_segments(SHM, Path("/proc/locks"))
+    if operating_system.is_linux():
+        yield shared_memory(SHM)
+        yield stale_segments(SHM, Path("/proc/locks"))
     yield log_folder(os.environ.get("ROS_LOG_DIR"), os.environ.get("ROS_HOME"))
     yield check_clock(time.time(), Path(__file__).stat().st_mtime)
-    yield check_counting(cgroups.delegated_group())
+    if operating_system.is_linux():
+        yield check_counting(cgroups.delegated_group())
 
 
 def check_counting(group: Path | None) -> HealthFinding:
@@ -97,10 +99,15 @@ def stale_segments(folder: Path, locks: Path) -> HealthFinding:
         held = {line.split()[5].rpartition(":")[2] for line in _lock_lines(locks)}
     except OSError as error:
         return make_ok(name, f"They could not be counted ({error.strerror or error})")
-    files = [path for path in folder.glob("fastrtps_*_el") if "port" not in path.name]
-    inodes = {path: str(found.st_ino) for path in files if (found := _stat_file(path))}
-    stale = [path for path, inode in inodes.items() if inode not in held]
-    parts = [_stat_file(part) for path in stale for part in folder.glob(f"{path.name[:-3]}*")]
+    files = [path for path in folder.glob("fastrtps_*") if "port" not in path.name]
+    inodes = {
+        path.name.removesuffix("_el"): str(found.st_ino)
+        for path in files
+        if path.name.endswith("_el") and (found := _stat_file(path))
+    }
+    stale = {name for name, inode in inodes.items() if inode not in held}
+    # A class that was killed leaves ten thousand: each is looked at once.
+    parts = [_stat_file(path) for path in files if _segment_of(path) in stale]
     size = sum(found.st_size for found in parts if found) >> 20
     if not stale:
         return make_ok(name, "none")
@@ -110,6 +117,11 @@ def stale_segments(folder: Path, locks: Path) -> HealthFinding:
         "programs that were killed.",
         "When no ROS program runs: rm -f /dev/shm/fastrtps_* /dev/shm/sem.fastrtps_*",
     )
+
+
+def _segment_of(path: Path) -> str:
+    """Return the segment that a file is a part of: ``fastrtps_0123`` of ``fastrtps_0123_el``."""
+    return "_".join(path.name.split("_")[:2])
 
 
 def _stat_file(path: Path) -> os.stat_result | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import socket
 import struct
@@ -10,10 +9,16 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
+from importlib import metadata
 
+from packaging.requirements import Requirement
+
+from course.doctor import ros_origin
 from course.doctor.finding import HealthFinding, make_ok, make_problem, make_warning
+from course.doctor.software import DISTRIBUTION
 from course.errors import DomainError
-from course.runtime.domains.leases import MAX_DOMAIN, MIN_DOMAIN, domains_in_use, lease_domain
+from course.runtime.domains import port_bases
+from course.runtime.domains.leases import free_domains, lease_domain
 from course.util.platform_check import WHEELS_ANEW, WHEELS_TORN
 
 DEADLINE_S = 40.0  # s for a probe, its imports included; it takes about 1 on an idle machine
@@ -22,28 +27,44 @@ _MULTICAST = ("239.255.0.1", 0)  # the group of DDSI-RTPS 9.6.1.4, on any free p
 
 
 def examine_ros() -> Iterator[HealthFinding]:
-    """Yield what there is to say about the wheels, DDS and the domains."""
-    yield check_domains(domains_in_use())
+    """Yield what there is to say about ROS 2, DDS and the domains."""
+    yield check_domains(sum(len(free_domains(base)) for base in port_bases.known_bases()))
     yield check_multicast()
-    if importlib.util.find_spec("rclpy") is None:
-        yield make_problem("ROS 2 wheels", WHEELS_TORN, WHEELS_ANEW)
+    origin = ros_origin.find_origin()
+    if origin is None:
+        yield make_problem("ROS 2", WHEELS_TORN, WHEELS_ANEW)
         return
+    yield ros_origin.check_origin(origin)
+    if not origin.from_wheels:
+        yield check_ros_packages()
     imports = run_probe("imports")
     if "error" in imports:
         yield make_problem(
-            "ROS 2 wheels",
+            "ROS 2",
             f"rclpy cannot be imported: {imports['error']}",
             "Mend what stands above. If all is well there, install the course again.",
         )
         return
-    yield make_ok("ROS 2 wheels", f"rclpy and {imports['rmw']} load in {imports['seconds']:.1f} s")
+    yield make_ok("ROS 2", f"rclpy and {imports['rmw']} load in {imports['seconds']:.1f} s")
     yield in_one_process()
     yield between_processes()
 
 
-def check_domains(in_use: set[int]) -> HealthFinding:
-    """Look how many domains are left for sessions, given those with open ports."""
-    free = len(set(range(MIN_DOMAIN + 1, MAX_DOMAIN + 1)) - in_use)
+def check_ros_packages(distribution: str = DISTRIBUTION) -> HealthFinding:
+    """Look whether an installed ROS 2 has the packages that the wheels would bring."""
+    requirements = [Requirement(text) for text in metadata.requires(distribution) or ()]
+    wheels = [r.name for r in requirements if r.name.startswith(ros_origin.WHEEL_PREFIX)]
+    if missing := ros_origin.missing_packages(wheels):
+        return make_problem(
+            "ROS 2 packages",
+            f"The ROS 2 that is installed here lacks {', '.join(missing)}.",
+            ros_origin.install_advice(missing),
+        )
+    return make_ok("ROS 2 packages", f"all {len(wheels)} that the course needs are there")
+
+
+def check_domains(free: int) -> HealthFinding:
+    """Judge how many domains are left for sessions."""
     mend = "Shut down notebooks and ROS programs that are no longer used."
     if not free:
         return make_problem("domains", "No ROS domain is free.", mend)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from packaging.requirements import Requirement
 
+from course.doctor import ros_origin
 from course.doctor.finding import HealthFinding, make_ok, make_problem, make_warning
 from course.util.platform_check import find_problem as platform_problem
 
@@ -37,8 +38,13 @@ def check_python(sentence: str | None = None) -> HealthFinding:
 
 
 def check_packages(distribution: str = DISTRIBUTION) -> HealthFinding:
-    """Compare every package that ``distribution`` requires with what is installed."""
+    """Compare every package that ``distribution`` requires with what is installed.
+
+    The ROS 2 wheels are not asked for where a ROS 2 that was installed in another way is found.
+    """
     name = "packages"
+    origin = ros_origin.find_origin()
+    has_other_ros = origin is not None and not origin.from_wheels
     try:
         required = [Requirement(text) for text in metadata.requires(distribution) or ()]
     except metadata.PackageNotFoundError:
@@ -48,6 +54,8 @@ def check_packages(distribution: str = DISTRIBUTION) -> HealthFinding:
     versions, wrong = {}, []
     for requirement in required:
         if requirement.marker and not requirement.marker.evaluate({"extra": ""}):
+            continue
+        if has_other_ros and requirement.name.startswith(ros_origin.WHEEL_PREFIX):
             continue
         try:
             version = versions[requirement.name] = metadata.version(requirement.name)

@@ -22,8 +22,10 @@ from course.runtime.context.context import (
 from course.runtime.logs.table import LogTable
 from course.runtime.requests.actions import GoalRun
 from course.runtime.requests.recorder import Recorder
+from course.util import argument_checks
 
 if TYPE_CHECKING:
+    from course.views.lives import Lives
     from course.views.world import World
 
 T = TypeVar("T")
@@ -149,6 +151,36 @@ def spin() -> None:
 def world(name: str | Path = "warehouse", *, seed: int = 0) -> World:
     """Return a live view of a simulated floor with a robot on it; see `Session.world`."""
     return session().world(name, seed=seed)
+
+
+def lives(
+    make: Callable[[int], Node], topic: str, *, times: int = 5, timeout: float = 5.0
+) -> Lives:
+    """Run a node for so many lives, and return a picture of what each has left behind.
+
+    Its threads, its open files and its endpoints are counted in this process, after each life. A
+    life begins with ``make(number)`` and lasts until a message comes on ``topic``::
+
+        course.lives(lambda life: CameraDriver(f"camera{life}"), "camera/image")
+
+    Args:
+        make: makes the node of a life; devices that an earlier life left open have other numbers.
+        topic: what the node publishes on.
+        times: how many lives; one more, which is not counted, comes first.
+        timeout: seconds that a message may take.
+
+    Raises:
+        SessionError: ``make`` made no node, or an argument is none.
+        WaitTimeout: no message came.
+    """
+    from course.views.lives import Lives
+    from course.watch.lives import live_repeatedly
+
+    argument_checks.check_function(make, "What makes a node", "lambda life: CameraDriver()")
+    topic = argument_checks.check_text(topic, "A topic", "camera/image")
+    argument_checks.check_whole_number(times, "times", least=1, example=5)
+    timeout = argument_checks.check_seconds(timeout)
+    return Lives(live_repeatedly(session(), make, topic, times, timeout))
 
 
 def _check_options(open_session: Session, options: dict[str, Any]) -> None:

@@ -12,6 +12,7 @@ from rclpy.qos import QoSProfile
 from course.errors import SessionError
 from course.messages.types import load_type
 from course.runtime.core_session import CoreSession
+from course.runtime.domains.leases import require_reachable
 from course.runtime.requests.graph_queries import full_action, full_node, full_service
 from course.util import argument_checks
 from course.util.close_matches import close_match
@@ -21,9 +22,11 @@ if TYPE_CHECKING:
     from course.views.action import ActionView
     from course.views.graph import GraphView
     from course.views.log import LogPanel
+    from course.views.panel import Panel
     from course.views.parameters import ParameterPanel
     from course.views.qos_lab import QoSLab
     from course.views.service import ServiceConsole
+    from course.views.shared.live_view import LiveView
     from course.views.timeline import Timeline
     from course.views.world import World
 
@@ -43,7 +46,7 @@ class Session(CoreSession):
         clock, and ends with the session, or when you ask for a world again.
 
         Args:
-            name: "warehouse", "corridor", "hall", or the path of a floor plan of your own (YAML).
+            name: "warehouse", "aisle", "corridor", "hall", or the path of your floor plan (YAML).
             seed: decides on the noise of the sensors: the same seed makes the same noise.
 
         Raises:
@@ -60,6 +63,24 @@ class Session(CoreSession):
             self._world.close()
         self._world = World(self, RunningWorld(self, plan, seed))
         return self._world
+
+    def panel(self, *shown: LiveView | Node | str) -> Panel:
+        """Return live views side by side, as an operator has them: of each thing the one that fits.
+
+        For example, ``session.panel(session.world("aisle"), "drive", "robot/battery")``.
+
+        Args:
+            shown: names of actions, services, nodes (their parameters) and topics; nodes; or views.
+
+        Raises:
+            SessionError: nothing to show, or too much; or the session is closed.
+            WaitTimeout: a name that nobody uses.
+        """
+        from course.learner_session.view_choice import choose_view
+        from course.views.panel import Panel
+
+        self.require_open()
+        return Panel([choose_view(self, each) for each in shown])
 
     def graph(self, *, everything: bool = False) -> GraphView:
         """Return a live view of the ROS graph as this session sees it.
@@ -203,6 +224,11 @@ class Session(CoreSession):
         except Exception:  # noqa: BLE001 - the session may end meanwhile; the wait has its own error
             return []
         return [f"{finding.message} {finding.mend}" for finding in found]
+
+    def _check_domain(self, domain_id: object) -> int:
+        domain = super()._check_domain(domain_id)
+        require_reachable(domain)
+        return domain
 
     def _type_of(self, what: str, name: str, known: list[tuple[str, list[str]]]) -> Any:
         types = dict(known)

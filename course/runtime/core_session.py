@@ -24,7 +24,7 @@ from course.runtime.context import close_order, signals
 from course.runtime.context.close_order import CloseReport
 from course.runtime.context.context import Discovery, open_context
 from course.runtime.context.interruptible import SessionContext
-from course.runtime.domains import domain_discovery
+from course.runtime.domains import domain_discovery, port_bases
 from course.runtime.domains.leases import check_domain_id, lease_domain
 from course.runtime.executor.blocked import BlockedCallback
 from course.runtime.logs.log_store import store
@@ -64,7 +64,7 @@ class CoreSession:
         """Open a session.
 
         Args:
-            domain_id: join this ROS domain, 0 to 101; None leases one that nobody else uses.
+            domain_id: join this ROS domain, such as 7; None leases one that nobody else uses.
             discovery: how far DDS looks for others: "LOCALHOST", "SUBNET" or "SYSTEM_DEFAULT".
             peers: addresses of further hosts to look for (a robot's, for instance).
             threads: 1 runs all callbacks one after the other, more run them in that many threads.
@@ -76,7 +76,10 @@ class CoreSession:
         """
         argument_checks.check_whole_number(threads, "threads", least=1, example=4)
         self._lease = lease_domain() if domain_id is None else None
-        self.domain_id: int = check_domain_id(self._lease.domain_id if self._lease else domain_id)
+        self.domain_id: int = (
+            self._lease.domain_id if self._lease else self._check_domain(domain_id)
+        )
+        port_bases.settle(port_bases.current_base())
         self.options = {
             "domain_id": domain_id,
             "discovery": discovery,
@@ -486,7 +489,8 @@ class CoreSession:
         """Stop every node and thread, shut the context down, give the domain back. Idempotent.
 
         Args:
-            timeout: seconds that callbacks which still run are given, all together.
+            timeout: seconds that callbacks which still run are given, all together; after half of
+                them their nodes are destroyed, so that a long one hears that it is to end.
 
         Returns:
             What was left behind: `leaked` names the threads whose callback did not end. Called
@@ -537,6 +541,10 @@ class CoreSession:
             with suppress(Exception):  # whatever it wanted to see: the session closes
                 self._before_close.pop()()
 
+    def _check_domain(self, domain_id: object) -> int:
+        """Return a domain that was asked for, if a session may be on it."""
+        return check_domain_id(domain_id)
+
     def _release_domain(self) -> None:
         if self._lease is not None:
             self._lease.release()
@@ -559,12 +567,17 @@ class CoreSession:
         self._endings.beat()
         if self._answering is not None:
             self._answering.stop()
-        leaked = self._host.pool.stop(deadline)
-        leaked += self._host.registry.forget_all()
+        # A callback that is at work for longer than half of the time may wait to be told that its
+        # node goes: by the node's own destroy_node(), its goal handle or rclpy.ok(). So what has
+        # leaked shows only after all of these.
+        now = time.monotonic()
+        self._host.pool.stop(now + (deadline - now) / 2)
+        problems = self._host.registry.forget_all()
         for callback in self._on_close:
             callback()
         self._host.pulse.beat()
         self.context.try_shutdown()
+        leaked = self._host.pool.find_leaks(deadline) + problems
         self._host.pool.shutdown(deadline)
         self.context.join(max(0.1, deadline - time.monotonic()))
         self.context.destroy()

@@ -1,11 +1,13 @@
 """Whether ROS 2 can run here at all. Needs nothing but the standard library.
 
-The ROS 2 wheels exist for CPython on Linux x86-64 only, and elsewhere ``import rclpy`` fails with
-an error that helps nobody. So this runs before anything imports it.
+The ROS 2 wheels exist for CPython on Linux x86-64 only. Elsewhere a ROS 2 that is installed in
+another way takes their place, and without one ``import rclpy`` fails with an error that helps
+nobody. So this runs before anything imports it.
 """
 
 from __future__ import annotations
 
+import importlib.util
 import platform
 import sys
 
@@ -29,7 +31,7 @@ themselves (``rclpy``), and nothing asks for those. `uv run` leaves alone what i
 
 
 class UnsupportedPlatformError(CourseError):
-    """A Python or a platform that there are no ROS 2 wheels for."""
+    """A Python or a platform that the course cannot run on."""
 
     exit_code = 2
 
@@ -41,6 +43,7 @@ def find_problem(
     implementation: str | None = None,
     version: tuple[int, int] | None = None,
     libc: str | None = None,
+    ros: bool | None = None,
 ) -> str | None:
     """Return one sentence that says why the course cannot run, or None if it can.
 
@@ -50,22 +53,16 @@ def find_problem(
         implementation: as `platform.python_implementation` gives it.
         version: (major, minor) of Python.
         libc: name of the C library, as `platform.libc_ver` gives it; empty if it is not glibc.
+        ros: whether Python finds an rclpy.
     """
     system = platform.system() if system is None else system
     machine = platform.machine() if machine is None else machine
     implementation = platform.python_implementation() if implementation is None else implementation
     version = sys.version_info[:2] if version is None else version
-    libc = platform.libc_ver()[0] if libc is None else libc
-    if (system, machine.lower()) not in {("Linux", "x86_64"), ("Linux", "amd64")}:
+    if system == "Windows":
         return (
-            f"This course runs on Linux x86-64 only, not on {system or 'this system'} {machine}, "
-            "because the ROS 2 wheels exist for nothing else: use a Linux x86-64 machine, a "
-            f"virtual machine, {'WSL 2, ' if system == 'Windows' else ''}or a JupyterHub."
-        )
-    if not libc:
-        return (
-            "This Linux does not use glibc (Alpine, for example, uses musl), and the ROS 2 wheels "
-            "need it: use Debian, Ubuntu, Fedora or the like."
+            "This course does not run on Windows itself: install WSL 2, with `wsl --install` in "
+            "PowerShell, and run it there."
         )
     if implementation != "CPython" or not OLDEST <= version <= NEWEST:
         return (
@@ -73,7 +70,26 @@ def find_problem(
             f"{implementation} {_version_text(version)}: run it with another Python, for example "
             f"`uv run --python {_version_text((3, 12))} course lab`."
         )
-    return None
+    if has_wheels(system, machine, libc) or (has_rclpy() if ros is None else ros):
+        return None
+    return (
+        f"There is no ROS 2 here: its wheels exist for Linux x86-64 with glibc only, not for "
+        f"{system or 'this system'} {machine}, and Python finds no other rclpy; "
+        "`source /opt/ros/jazzy/setup.bash` or activate RoboStack's environment, if you have one, "
+        "or use a Linux x86-64 machine, a container or a JupyterHub."
+    )
+
+
+def has_wheels(system: str, machine: str, libc: str | None = None) -> bool:
+    """Return whether there are ROS 2 wheels for a machine; the arguments are `find_problem`'s."""
+    if (system, machine.lower()) not in {("Linux", "x86_64"), ("Linux", "amd64")}:
+        return False
+    return bool(platform.libc_ver()[0] if libc is None else libc)
+
+
+def has_rclpy() -> bool:
+    """Return whether Python finds an rclpy, without importing it."""
+    return importlib.util.find_spec("rclpy") is not None
 
 
 def require_supported_platform() -> None:

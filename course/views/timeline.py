@@ -14,7 +14,11 @@ from course.runtime.core_session import CoreSession
 from course.util import argument_checks
 from course.views.pictures.timeline_svg import draw_timeline_svg
 from course.views.shared.live_view import Frame, LiveView
-from course.views.timeline_words import describe_figures, describe_shortening
+from course.views.timeline_words import (
+    describe_figures,
+    describe_newest,
+    describe_shortening,
+)
 from course.watch import timeline
 from course.watch.callbacks import CallbackTap, Run
 from course.watch.timeline import Figures, Trace
@@ -155,6 +159,8 @@ class Timeline(LiveView):
             figures = timeline.compute_figures(trace.passages_since(start))
             text = describe_figures(figures) + describe_shortening(trace, tap, start)
             lines.append(f"  {trace.topic}: {text}")
+            if newest := describe_newest(trace):
+                lines.append(f"    newest message: {newest}")
             for node, runs in _by_node(tap.runs_since(start)).items():
                 missed = sum(count for _, count in timeline.find_drops(runs))
                 passed = f", {missed} messages passed it by" if missed else ""
@@ -195,6 +201,7 @@ class Timeline(LiveView):
         return {
             "name": trace.topic,
             "text": describe_figures(found) + describe_shortening(trace, tap, start),
+            "newest": describe_newest(trace),
             "lanes": lanes,
             "rate": _round_values(plots.rate, 1.0, 2),
             "p50": _round_values(plots.p50, 1e3, 3),

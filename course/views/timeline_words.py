@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import time
 
+from rclpy.serialization import deserialize_message
+
 from course.messages.yaml_text import format_count
 from course.watch import timeline
 from course.watch.callbacks import CallbackTap
 from course.watch.timeline import Figures, Trace
+from course.worlds.messages import describe_message
+
+MAX_READ_BYTES = 100_000
+"""Bytes of a message that is read, to say what is in it."""
 
 
 def describe_figures(figures: Figures) -> str:
@@ -39,3 +45,13 @@ def describe_shortening(trace: Trace, tap: CallbackTap, start: int) -> str:
         f" (of the last {seconds:.1f} s only: a timeline keeps {timeline.KEPT_MESSAGES} messages "
         "of a topic, and as many runs of callbacks)"
     )
+
+
+def describe_newest(trace: Trace) -> str:
+    """Return the gist of the message that came last; "" before the first."""
+    message = trace.newest_message
+    if message is None:
+        return ""
+    if len(message) > MAX_READ_BYTES:
+        return f"{len(message) // 1000} kB"
+    return describe_message(deserialize_message(message, trace.msg_type))

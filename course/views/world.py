@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import math
+import functools
 import time
-from typing import Any
+from collections.abc import Callable
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
-from course.errors import CourseError, SessionError
+from course.errors import CourseError
 from course.runtime.core_session import CoreSession
 from course.views import world_picture, world_words
 from course.views.shared.live_view import SLOW_PERIOD_S, Frame, LiveView
@@ -26,6 +27,22 @@ MAX_MARKS = 300
 
 MAX_TEXT_CHARS = 300
 """Characters of a name, a sentence or a message."""
+
+
+Arguments = ParamSpec("Arguments")
+Returned = TypeVar("Returned")
+
+
+def _pass_on(
+    control: Callable[Concatenate[RunningWorld, Arguments], Returned],
+) -> Callable[Concatenate[World, Arguments], Returned]:
+    """Return a method of the view that is the simulation's: `help()` and types are the same."""
+
+    @functools.wraps(control)
+    def use(self: World, /, *args: Arguments.args, **kwargs: Arguments.kwargs) -> Returned:
+        return control(self.simulation, *args, **kwargs)
+
+    return use
 
 
 class World(LiveView):
@@ -58,58 +75,18 @@ class World(LiveView):
         self._chosen = ""
         self._problem = ""
 
-    def pause(self) -> None:
-        """Stop the world's time."""
-        self.simulation.pause()
-
-    def resume(self) -> None:
-        """Let the world's time go on."""
-        self.simulation.resume()
-
-    def step_once(self) -> None:
-        """Move the world on by 0.1 s."""
-        self.simulation.step_once()
-
-    def reset(self) -> None:
-        """Put everything back to where it was at the beginning, and mend all faults."""
-        self.simulation.reset()
-
-    def drive(self, speed: float, turn: float) -> None:
-        """Command ``speed`` (m/s) and ``turn`` (rad/s, left is positive), as `cmd_vel` does."""
-        self.simulation.drive(_check_number(speed), _check_number(turn))
-
-    def close(self) -> None:
-        """End the world: its node goes from the graph. Idempotent."""
-        self.simulation.close()
-
-    def press_stop(self) -> None:
-        """Press the emergency stop."""
-        self.simulation.press_stop()
-
-    def release_stop(self) -> None:
-        """Release the emergency stop."""
-        self.simulation.release_stop()
-
-    def set_fault(self, what: str, state: str) -> None:
-        """Let something fail, or work again; `course.worlds.simulation.FAULTS` has what there is.
-
-        Raises:
-            SessionError: there is no such part, or no such state of it.
-        """
-        self.simulation.set_fault(what, state)
-
-    def add_obstacle(self, x: float, y: float, radius: float = 0.2) -> int:
-        """Put a round obstacle at (``x``, ``y``), all in m; return its number."""
-        place = _check_number(x), _check_number(y)
-        return self.simulation.add_obstacle(*place, _check_number(radius))
-
-    def move_obstacle(self, number: int, x: float, y: float) -> None:
-        """Move an obstacle to (``x``, ``y``), in m."""
-        self.simulation.move_obstacle(number, _check_number(x), _check_number(y))
-
-    def remove_obstacle(self, number: int) -> None:
-        """Take an obstacle away."""
-        self.simulation.remove_obstacle(number)
+    pause = _pass_on(RunningWorld.pause)
+    resume = _pass_on(RunningWorld.resume)
+    step_once = _pass_on(RunningWorld.step_once)
+    reset = _pass_on(RunningWorld.reset)
+    drive = _pass_on(RunningWorld.drive)
+    close = _pass_on(RunningWorld.close)
+    press_stop = _pass_on(RunningWorld.press_stop)
+    release_stop = _pass_on(RunningWorld.release_stop)
+    set_fault = _pass_on(RunningWorld.set_fault)
+    add_obstacle = _pass_on(RunningWorld.add_obstacle)
+    move_obstacle = _pass_on(RunningWorld.move_obstacle)
+    remove_obstacle = _pass_on(RunningWorld.remove_obstacle)
 
     def handle_control(self, message: dict[str, Any]) -> None:
         """Do what a button, a key or the pointer asks for; what cannot be done is said."""
@@ -205,17 +182,6 @@ class World(LiveView):
         if topic["name"] == self._chosen:
             row["last"] = cut_text(str(topic["last"]), MAX_TEXT_CHARS)
         return row
-
-
-def _check_number(value: Any) -> float:
-    """Return a finite number.
-
-    Raises:
-        SessionError: it is none.
-    """
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise SessionError(f"The world takes finite numbers (m, m/s, rad/s), not {value!r}.")
-    return float(value)
 
 
 def _round(value: Any) -> Any:

@@ -108,6 +108,12 @@ class Trace:
         with self._lock:
             return list(self._messages)
 
+    @property
+    def newest_message(self) -> bytes | None:
+        """The message that came last, as CDR; None before the first."""
+        with self._lock:
+            return self._messages[-1][1] if self._messages else None
+
     def adapt_qos(self) -> None:
         """Subscribe again if there is a publisher now that offers less than was requested.
 

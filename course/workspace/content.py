@@ -30,6 +30,24 @@ def content_root() -> Path:
     return _first_folder("notebooks", _CLONE / "notebooks", _DATA / "notebooks")
 
 
+def clone_root() -> Path | None:
+    """Return the clone of the repository that this runs from, or None if it was installed."""
+    return _CLONE if (_CLONE / "pyproject.toml").is_file() else None
+
+
+def constraints_file() -> Path:
+    """Return the file with the versions that the course was tested with, as pip takes it.
+
+    Raises:
+        ContentError: the installation is incomplete.
+    """
+    places = _CLONE / ".ci" / "constraints.txt", _DATA / "constraints.txt"
+    for place in places:
+        if place.is_file():
+            return place
+    raise _missing("constraints", places[-1])
+
+
 def working_root() -> Path:
     """Return the nbgrader course root to work in, where files may be written.
 
@@ -80,7 +98,11 @@ def _first_folder(what: str, *places: Path) -> Path:
     for place in places:
         if place.is_dir():
             return place
-    raise ContentError(
-        f"The course's {what} are missing from this installation ({places[-1]}): install "
-        "ros2-course again."
+    raise _missing(what, places[-1])
+
+
+def _missing(what: str, place: Path) -> ContentError:
+    return ContentError(
+        f"The course's {what} are missing from this installation ({place}): install ros2-course "
+        "again."
     )

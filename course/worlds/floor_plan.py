@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -67,6 +67,8 @@ class FloorPlan(_Part):
     """A rectangle of floor from (0, 0) to ``size``, with a wall around it, and what it holds.
 
     ``slip`` is the share of the wheels' travel that is lost, so that wheel odometry drifts.
+    ``interfaces`` are what the robot offers beside its usual topics: a ``line`` that begins at the
+    first station, a ``navigator``, speed ``limits``; see `course.worlds.interfaces`.
     """
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")
@@ -78,6 +80,7 @@ class FloorPlan(_Part):
     shelves: list[Four] = Field(default=[], max_length=100)
     people: list[Walker] = Field(default=[], max_length=20)
     slip: float = Field(default=0.0, ge=0, le=0.5)
+    interfaces: list[Literal["line", "navigator", "limits"]] = Field(default=[], max_length=3)
 
     @model_validator(mode="after")
     def _hold_together(self) -> FloorPlan:
@@ -209,6 +212,8 @@ def _find_misplaced(plan: FloorPlan) -> list[str]:
         for i, name in enumerate(names, 1)
         if name in names[: i - 1]
     ]
+    if "line" in plan.interfaces and not plan.stations:
+        found.append("field stations: a line begins at the first station, so write at least one")
     room = _room_at_start(plan)
     if not found and room < ROBOT_RADIUS_M:
         found.append(

@@ -13,6 +13,8 @@ from nav_msgs.msg import Odometry
 from numpy.typing import NDArray
 from sensor_msgs.msg import BatteryState, Image, Imu, LaserScan
 
+from course.messages.values import to_data
+from course.messages.yaml_text import one_line
 from course.worlds.robot.camera import HEIGHT, WIDTH
 from course.worlds.robot.lidar import BEAMS, RANGE_MAX_M, RANGE_MIN_M
 from course.worlds.robot.motion import (
@@ -107,9 +109,13 @@ def type_name(msg_type: Any) -> str:
 
 
 def describe_message(message: Any) -> str:
-    """Return the gist of a message of the world, at most 80 characters."""
-    describe: Callable[[Any], str] = _TEXTS.get(type(message).__name__, str)
+    """Return the gist of a message, at most 80 characters."""
+    describe: Callable[[Any], str] = _TEXTS.get(type(message).__name__, _describe_fields)
     return describe(message)[:_MAX_CHARS]
+
+
+def _describe_fields(message: Any) -> str:
+    return one_line(to_data(message))
 
 
 def _describe_scan(message: Any) -> str:
@@ -144,6 +150,7 @@ _TEXTS = {
     "Twist": lambda message: f"{message.linear.x:.2f} m/s, {message.angular.z:.2f} rad/s",
     "String": lambda message: repr(message.data),
     "Bool": lambda message: str(message.data).lower(),
+    "Float64": lambda message: f"{message.data:.2f}",
     "Path": lambda message: f"{len(message.poses)} poses",
     "PoseArray": lambda message: f"{len(message.poses)} obstacles",
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
@@ -85,12 +86,12 @@ class RunningWorld:
         """Whether it has ended: with its session, or because somebody stopped its node."""
         return self._session.closed or not is_alive(self._node)
 
-    # Controls: see `Simulation`. All raise a SessionError once the world has ended.
+    # Controls. All raise a SessionError once the world has ended, and for what is no number.
 
     def drive(self, speed: float, turn: float) -> None:
-        """Command m/s and rad/s, as a message on ``cmd_vel`` does; it holds for 0.5 s."""
+        """Command m/s and rad/s (left is positive), as `cmd_vel` does; it holds for 0.5 s."""
         with self._paced.lock:
-            self._control().drive(speed, turn)
+            self._control().drive(_check_number(speed), _check_number(turn))
 
     def press_stop(self) -> None:
         """Press the emergency stop."""
@@ -105,14 +106,15 @@ class RunningWorld:
             self._node.publish_events()
 
     def add_obstacle(self, x: float, y: float, radius: float = 0.2) -> int:
-        """Put a round obstacle on the floor (m); return its id."""
+        """Put a round obstacle at (``x``, ``y``), all in m; return its number."""
+        numbers = _check_number(x), _check_number(y), _check_number(radius)
         with self._paced.lock:
-            return self._control().add_obstacle(x, y, radius)
+            return self._control().add_obstacle(*numbers)
 
     def move_obstacle(self, number: int, x: float, y: float) -> None:
-        """Move an obstacle."""
+        """Move an obstacle to (``x``, ``y``), in m."""
         with self._paced.lock:
-            self._control().move_obstacle(number, x, y)
+            self._control().move_obstacle(number, _check_number(x), _check_number(y))
 
     def remove_obstacle(self, number: int) -> None:
         """Take an obstacle away."""
@@ -120,16 +122,20 @@ class RunningWorld:
             self._control().remove_obstacle(number)
 
     def set_fault(self, what: str, state: str) -> None:
-        """Let something fail, or work again: ``world.set_fault("wheels", "jammed")``."""
+        """Let something fail, or work again: ``world.set_fault("wheels", "jammed")``.
+
+        Raises:
+            SessionError: there is no such part, or no such state of it; the error names all.
+        """
         with self._paced.lock:
             self._control().set_fault(what, state)
             self._node.publish_events()
 
     def reset(self) -> None:
-        """Begin anew, with everything as at first."""
+        """Put everything back to where it was at first, and mend all faults."""
         with self._paced.lock:
-            self._control().reset()
-            self._node.publish_events()
+            self._control()
+            self._node.reset()
 
     # What other nodes have to do with it.
 
@@ -210,3 +216,14 @@ class RunningWorld:
                 'another one with course.world("warehouse").'
             )
         return self._paced.simulation
+
+
+def _check_number(value: Any) -> float:
+    """Return a finite number.
+
+    Raises:
+        SessionError: it is none.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise SessionError(f"The world takes finite numbers (m, m/s, rad/s), not {value!r}.")
+    return float(value)

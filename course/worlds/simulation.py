@@ -11,26 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from course.errors import SessionError
-from course.util.close_matches import did_you_mean
 from course.worlds import descriptions
 from course.worlds.descriptions import Shown, thin_points
 from course.worlds.floor import Floor
 from course.worlds.floor_plan import FloorPlan
 from course.worlds.robot.base import LOW_CHARGE, STEP_S, Robot
 from course.worlds.robot.camera import render_camera
+from course.worlds.robot.faults import check_fault, possible_faults
 from course.worlds.robot.gripper import Gripper
 from course.worlds.robot.lidar import read_lidar
 from course.worlds.robot.motion import ImuReading, WheelReading, read_imu, read_wheels
-
-FAULTS = {
-    "gripper": ("works", "slow", "dead", "refuses"),
-    "wheels": ("free", "jammed"),
-    "camera": ("works", "unplugged"),
-    "radio": ("there", "gone"),
-    "battery": ("normal", "low"),
-}
-"""What can fail, and its states; the first is the sound one."""
 
 SCAN_STEPS, CAMERA_STEPS, WHEEL_STEPS, BATTERY_STEPS = 10, 10, 5, 100
 """Steps between two readings: 10 Hz, 10 Hz, 20 Hz, 1 Hz. The IMU reads in every step."""
@@ -61,6 +51,7 @@ class Simulation:
 
     Attributes:
         plan: the floor plan.
+        possible_faults: what can fail, with its states; the first is the sound one.
         time_s: simulated seconds since it began, or since the last reset.
         robot: where it is, and what it does.
         floor: what is around it.
@@ -70,6 +61,7 @@ class Simulation:
     def __init__(self, plan: FloorPlan, seed: int = 0) -> None:
         """Begin; ``seed`` decides on the noise of the sensors."""
         self.plan = plan
+        self.possible_faults = possible_faults(plan)
         self._seed = seed
         self._events: deque[tuple[str, Any]] = deque(maxlen=_MAX_EVENTS)
         self._begin()
@@ -79,7 +71,8 @@ class Simulation:
         self.robot = Robot(self.plan)
         self.floor = Floor(self.plan)
         self.gripper = Gripper()
-        self.faults = {what: states[0] for what, states in FAULTS.items()}
+        self.faults = {what: states[0] for what, states in self.possible_faults.items()}
+        self._speed_on = 0.0
         self.scan: NDArray[np.float32] | None = None
         self._lidar_noise = np.random.default_rng([self._seed, 1])
         self._imu_noise = np.random.default_rng([self._seed, 2])
@@ -93,6 +86,8 @@ class Simulation:
     def step(self) -> Readings:
         """Move on by `STEP_S`; return what the sensors read then."""
         robot, touched = self.robot, self.robot.touching
+        if self._speed_on:
+            robot.drive(self._speed_on, 0.0)
         self.floor.step(STEP_S, robot.x, robot.y)
         charger = self.plan.charger
         robot.step(
@@ -142,7 +137,19 @@ class Simulation:
         """Command m/s and rad/s; it holds for 0.5 s. What is no number stops the robot."""
         if not (math.isfinite(speed) and math.isfinite(turn)):
             speed = turn = 0.0
+        self._speed_on = 0.0
         self.robot.drive(speed, turn)
+
+    def drive_on(self, speed: float) -> None:
+        """Command m/s straight on; it holds until the next command of any kind."""
+        self.drive(speed, 0.0)
+        self._speed_on = speed if math.isfinite(speed) and not self.robot.stopped else 0.0
+
+    def limit_speeds(self, speed: float, turn: float) -> None:
+        """Limit m/s and rad/s, in both directions, from now on. What is no limit is left alone."""
+        if all(math.isfinite(limit) and limit >= 0.0 for limit in (speed, turn)):
+            self.robot.limit_speeds(speed, turn)
+            self.tell(f"The speed limits became {speed:g} m/s and {turn:g} rad/s")
 
     def command_gripper(self, closed: bool) -> bool:
         """Close or open the gripper; return False if it refuses."""
@@ -159,7 +166,7 @@ class Simulation:
         """Release the emergency stop; the next command moves the robot again."""
         if self.robot.stopped:
             self.tell("The emergency stop was released")
-            self.robot.drive(0.0, 0.0)
+            self.drive(0.0, 0.0)
             self.robot.stopped = False
             self._events.append(("emergency", "released"))
 
@@ -176,21 +183,12 @@ class Simulation:
         self.floor.remove_obstacle(number)
 
     def set_fault(self, what: str, state: str) -> None:
-        """Let something fail, or work again; see `FAULTS`.
+        """Let something fail, or work again; see `possible_faults`.
 
         Raises:
             SessionError: there is no such thing, or no such state.
         """
-        if what not in FAULTS:
-            raise SessionError(
-                f"Nothing called {what!r} can fail: there are {', '.join(FAULTS)}."
-                + did_you_mean(str(what), FAULTS)
-            )
-        if state not in FAULTS[what]:
-            raise SessionError(
-                f"The {what} cannot be {state!r}: it is one of {', '.join(FAULTS[what])}."
-                + did_you_mean(str(state), FAULTS[what])
-            )
+        check_fault(self.possible_faults, what, state)
         if self.faults[what] == state:
             return
         self.faults[what] = state
@@ -219,8 +217,9 @@ class Simulation:
     # Looking.
 
     def describe_floor(self) -> dict[str, Any]:
-        """Return what never changes, as JSON: lengths in m."""
-        return descriptions.describe_floor(self.plan)
+        """Return what never changes, as JSON: lengths in m; and what can fail, with its states."""
+        possible = {what: list(states) for what, states in self.possible_faults.items()}
+        return {**descriptions.describe_floor(self.plan), "faults": possible}
 
     def describe_moment(self) -> dict[str, Any]:
         """Return what is now, as JSON of bounded size: m, rad, s."""

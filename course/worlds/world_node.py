@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Collection, Iterable
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable
 from typing import Any
 
 from geometry_msgs.msg import PoseArray, Twist
 from nav_msgs.msg import Odometry, Path
 from rclpy.node import Node
-from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from rclpy.subscription import Subscription
 from sensor_msgs.msg import BatteryState, Image, Imu, LaserScan
 from std_msgs.msg import Bool, String
-from std_srvs.srv import SetBool, Trigger
+from std_srvs.srv import Trigger
 
 from course.worlds import messages
+from course.worlds.interfaces.gripper_service import GripperService
+from course.worlds.interfaces.line_drive import LineDrive
+from course.worlds.interfaces.navigator import Navigator
+from course.worlds.interfaces.ports import Deliver, Ports
 from course.worlds.pacing import PacedSimulation
 from course.worlds.robot.base import STEP_S
-from course.worlds.robot.gripper import SLOW_STEPS
 from course.worlds.simulation import (
     BATTERY_STEPS,
     CAMERA_STEPS,
@@ -48,29 +48,6 @@ _OUTPUTS: tuple[tuple[str, Any, QoSProfile | int, float], ...] = (
 _EVENTS = {"emergency": "emergency/stop", "bumper": "bumper", "jammed": "hardware/jammed"}
 
 
-Deliver = Callable[[str, Any], None]
-"""Takes the name of a sensor's topic and a message, in the world's thread: a cable."""
-
-
-@dataclass
-class _Topic:
-    """A topic of the world: its rate in Hz (0 for events), and the last message or its maker."""
-
-    name: str
-    msg_type: Any
-    rate: float
-    last: Any = None
-
-    def describe(self) -> dict[str, Any]:
-        last = self.last() if callable(self.last) else self.last
-        return {
-            "name": self.name,
-            "type": messages.type_name(self.msg_type),
-            "rate": round(self.rate, 1),
-            "last": "" if last is None else messages.describe_message(last),
-        }
-
-
 class WorldNode(Node):
     """Moves a paced simulation on, publishes its readings, and passes commands to it."""
 
@@ -79,23 +56,19 @@ class WorldNode(Node):
         super().__init__(name)
         self._paced = paced
         self._simulation = paced.simulation
-        self._topics: dict[str, _Topic] = {}
-        self._outputs: dict[str, Publisher] = {}
-        self._inputs: dict[str, Subscription] = {}
-        self._deliver: Deliver = _drop_message
-        self._cables: Collection[str] = ()
+        self._ports = ports = Ports(self, paced, self.advance)
         for topic, msg_type, qos, rate in _OUTPUTS:
-            self._outputs[topic] = publisher = self.create_publisher(msg_type, topic, qos)
-            self._topics[topic] = _Topic(publisher.topic_name, msg_type, rate)
-        self._listen(Twist, "cmd_vel", self._on_command)
-        self._listen(Path, "plan", self._on_path)
-        self._listen(PoseArray, "obstacles", self._on_found)
+            ports.advertise(topic, msg_type, qos, rate)
+        ports.listen(Twist, "cmd_vel", self._on_command)
+        ports.listen(Path, "plan", self._on_path)
+        ports.listen(PoseArray, "obstacles", self._on_found)
         self.create_service(Trigger, "world/reset", self._on_reset)
-        self._gripper = self.create_service(SetBool, "gripper/set", self._on_gripper)
-        # A service of rclpy answers when its callback returns. This one may answer late, or never.
-        self._reply = self._gripper.send_response
-        self._gripper.send_response = self._send_gripper_reply  # type: ignore[method-assign]
-        self._late_replies: list[list[Any]] = []  # steps left, response, header
+        self._gripper = GripperService(ports)
+        offered = self._simulation.plan.interfaces
+        self._line = LineDrive(ports) if "line" in offered else None
+        self._navigator = Navigator(ports) if "navigator" in offered else None
+        if "limits" in offered:
+            ports.listen(Twist, "wheels/limits", self._on_limits)
         self.create_timer(STEP_S if paced.exact else WALL_PERIOD_S, self.advance)
 
     @property
@@ -115,10 +88,19 @@ class WorldNode(Node):
 
     def publish_events(self) -> None:
         """Publish what has happened since: stops, bumps, jams."""
-        if self._has_radio:  # else they wait until it is back
+        if self._ports.has_radio:  # else they wait until it is back
             for kind, value in self._simulation.take_events():
-                topic = _EVENTS[kind]
-                self._publish(topic, self._topics[topic].msg_type(data=value))
+                self._ports.publish_value(_EVENTS[kind], value)
+
+    def reset(self) -> None:
+        """Put everything back to where it was; a call of the gripper that waits is not answered."""
+        with self._paced.lock:
+            self.advance()
+            self._simulation.reset()
+            self._gripper.reset()
+            if self._navigator is not None:
+                self._navigator.reset()
+            self.publish_events()
 
     def hand_over(self, deliver: Deliver, cables: Collection[str], motors: str) -> None:
         """Leave the robot's topics to other nodes, which have its cables from now on.
@@ -130,40 +112,20 @@ class WorldNode(Node):
         """
         assert self.executor is not None
         with self.executor.hold_still(), self._paced.lock:  # type: ignore[attr-defined]
-            self._deliver, self._cables = deliver, cables
-            for publisher in self._outputs.values():
-                self.destroy_publisher(publisher)
-            self._outputs.clear()
-            for topic, subscription in self._inputs.items():
-                del self._topics[topic]
-                self.destroy_subscription(subscription)
-            self._inputs.clear()
-            self._listen(Twist, motors, self._on_command)
+            self._ports.hand_over(deliver, cables)
+            self._ports.listen(Twist, motors, self._on_command)
 
     def describe_topics(self) -> list[dict[str, Any]]:
         """Return name, type, rate (Hz, 0 for what comes now and then) and last message of each."""
-        return [topic.describe() for topic in self._topics.values()]
+        return self._ports.describe()
 
     # Inside.
 
-    @property
-    def _has_radio(self) -> bool:
-        return self._simulation.faults["radio"] == "there"
-
-    def _listen(self, msg_type: Any, topic: str, handle: Callable[[Any], None]) -> None:
-        def receive(message: Any) -> None:
-            with self._paced.lock:
-                self.advance()  # a command holds from now on, whether or not the timer came first
-                if self._has_radio:
-                    entry.last = message
-                    handle(message)
-
-        subscription = self.create_subscription(msg_type, topic, receive, 10)
-        entry = self._topics[topic] = _Topic(subscription.topic_name, msg_type, 0.0)
-        self._inputs[topic] = subscription
-
     def _on_command(self, message: Twist) -> None:
         self._simulation.drive(message.linear.x, message.angular.z)
+
+    def _on_limits(self, message: Twist) -> None:
+        self._simulation.limit_speeds(message.linear.x, message.angular.z)
 
     def _on_path(self, message: Path) -> None:
         positions = [pose.pose.position for pose in message.poses]
@@ -174,77 +136,40 @@ class WorldNode(Node):
         self._simulation.show_found([(point.x, point.y) for point in positions])
 
     def _on_reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        with self._paced.lock:
-            self.advance()
-            self._simulation.reset()
-            self._late_replies.clear()
-            self.publish_events()
+        self.reset()
         response.success, response.message = True, "The world is as at first."
         return response
 
-    def _on_gripper(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        with self._paced.lock:
-            self.advance()
-            response.success = self._has_radio and self._simulation.command_gripper(request.data)
-        done = "closed" if request.data else "opened"
-        response.message = done if response.success else "refused"
-        return response
-
-    def _send_gripper_reply(self, response: SetBool.Response, header: Any) -> None:
-        state = self._simulation.faults["gripper"]
-        if state == "dead" or not self._has_radio:
-            return
-        if state == "slow":
-            self._late_replies.append([SLOW_STEPS, response, header])
-        else:
-            self._reply(response, header)
-
-    def _send_late_replies(self) -> None:
-        for waiting in self._late_replies:
-            waiting[0] -= 1
-            if waiting[0] <= 0 and self._has_radio:
-                self._reply(waiting[1], waiting[2])
-        self._late_replies = [waiting for waiting in self._late_replies if waiting[0] > 0]
-
     def _publish_steps(self, steps: Iterable[tuple[int, Readings]]) -> None:
         for stamp_ns, readings in steps:
-            self._publish_readings(stamp_ns, readings)
+            if self._ports.has_radio:
+                self._publish_readings(stamp_ns, readings)
             self.publish_events()
-            if self._late_replies:
-                self._send_late_replies()
+            self._gripper.after_step()
+            if self._navigator is not None:
+                self._navigator.after_step()
 
     def _publish_readings(self, stamp_ns: int, readings: Readings) -> None:
-        if not self._has_radio:
-            return
-        imu = functools.partial(messages.make_imu, stamp_ns, readings.imu)
-        if self._is_heard("imu/data"):  # at 100 Hz a message that nobody gets is worth saving
-            self._publish("imu/data", imu())
-        self._topics["imu/data"].last = imu
+        ports = self._ports
+        ports.publish_if_heard(
+            "imu/data", functools.partial(messages.make_imu, stamp_ns, readings.imu)
+        )
         if readings.scan is not None:
             period_s = SCAN_STEPS * STEP_S
-            self._publish("scan", messages.make_scan(stamp_ns, readings.scan, period_s))
-        if readings.picture_due and self._is_heard("camera/image"):
+            ports.publish("scan", messages.make_scan(stamp_ns, readings.scan, period_s))
+        if readings.picture_due and ports.is_heard("camera/image"):
             picture = self._simulation.render_picture()
-            self._publish("camera/image", messages.make_image(stamp_ns, picture))
+            ports.publish("camera/image", messages.make_image(stamp_ns, picture))
         if readings.wheels is not None:
-            self._publish("wheel/odometry", messages.make_odometry(stamp_ns, readings.wheels))
+            ports.publish("wheel/odometry", messages.make_odometry(stamp_ns, readings.wheels))
         if readings.charge is not None:
-            charging = self._simulation.robot.charging
-            state = messages.make_battery_state(stamp_ns, readings.charge, charging=charging)
-            self._publish("battery_state", state)
+            self._publish_every_second(stamp_ns, readings.charge)
+        if self._line is not None:
+            self._line.publish_readings(readings)
 
-    def _is_heard(self, topic: str) -> bool:
-        if topic in self._outputs:
-            return self._outputs[topic].get_subscription_count() > 0
-        return topic in self._cables
-
-    def _publish(self, topic: str, message: Any) -> None:
-        self._topics[topic].last = message
-        if topic in self._outputs:
-            self._outputs[topic].publish(message)
-        else:
-            self._deliver(topic, message)
-
-
-def _drop_message(_topic: str, _message: Any) -> None:
-    """Have no cables."""
+    def _publish_every_second(self, stamp_ns: int, charge: float) -> None:
+        robot = self._simulation.robot
+        state = messages.make_battery_state(stamp_ns, charge, charging=robot.charging)
+        self._ports.publish("battery_state", state)
+        if robot.jammed:  # again, as a node that has come since need not ask for a latched one
+            self._ports.publish_value("hardware/jammed", True)

@@ -107,6 +107,16 @@ class NotebookPage:
         self.command("notebook:run-cell")
         self.wait_until_ready()
 
+    def start_cell(self, number: int) -> None:
+        """Run one cell, counted from 0, and do not wait."""
+        self.page.evaluate(
+            """number => {
+                window.jupyterapp.shell.currentWidget.content.activeCellIndex = number;
+                window.jupyterapp.commands.execute('notebook:run-cell');
+            }""",
+            number,
+        )
+
     def write_cell(self, number: int, source: str) -> None:
         """Replace what stands in a cell, counted from 0."""
         self.page.evaluate(

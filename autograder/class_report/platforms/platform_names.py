@@ -8,7 +8,8 @@ from its grading worksheet. Who is meant is found by the files themselves, which
 Moodle (``mod/assign/feedback/file/importziplib.php``): a folder FULL NAME_NUMBER_TYPE_PLUGIN; the
 number is the participant's in this assignment. Canvas (``Assignment``,
 ``infer_comment_context_from_filename``): the first two parts of a file name, between underscores,
-that are all digits are the user's number and that of the file that was handed in.
+that are all digits are the user's number and that of the file that was handed in. How the downloads
+are named stands in `download_names`.
 """
 
 from __future__ import annotations
@@ -22,8 +23,9 @@ import zipfile
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
+from autograder.assignments.intake.handed_files.download_names import parse_canvas, parse_moodle
 from autograder.class_report.class_data import Person
 from course.errors import CourseError
 
@@ -83,11 +85,8 @@ def of_moodle(path: Path) -> list[Participant]:
     else:
         by_label: defaultdict[str, list[File]] = defaultdict(list)
         for name, file in _read_files(path):
-            for part in PurePosixPath(name).parts:
-                cut = part.split("_", 4)
-                if len(cut) >= 4 and cut[1].isdecimal() and cut[2].startswith("assign"):
-                    by_label["_".join(cut[:4]) + "_"].append(file)
-                    break
+            if said := parse_moodle(name):
+                by_label[f"{said.who}_{said.number}_{said.plugin}_"].append(file)
         found = [
             Participant(label.split("_")[1], label,
                         frozenset({_comparable_name(label.split("_")[0])}), tuple(files))
@@ -106,9 +105,8 @@ def of_canvas(path: Path) -> list[Participant]:
     """Return the participants of a downloaded archive or its unpacked folder; raises as above."""
     by_number: defaultdict[str, list[File]] = defaultdict(list)
     for name, file in _read_files(path):
-        numbers = [part for part in PurePosixPath(name).name.split("_") if part.isdecimal()]
-        if len(numbers) >= 2:
-            by_number[numbers[0]].append(file)
+        if (said := parse_canvas(name)) and said.number.isdecimal():
+            by_number[said.number].append(file)
     if not by_number:
         raise NamesError(
             f"{path.name} has no names of Canvas's (name_NUMBER_NUMBER_file): give the archive of "

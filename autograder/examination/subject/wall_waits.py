@@ -13,8 +13,8 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
-from course.runtime.callbacks.idleness import ThreadSample, look_at
 from course.runtime.executor.blocked import BlockedCallback
+from course.util.operating_system import ThreadSample, look_at
 
 NAP_S = 0.1
 """Seconds beyond which a callback's sleep is no nap any more."""

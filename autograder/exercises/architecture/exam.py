@@ -45,6 +45,8 @@ EXAM: Exam[ObservedDesign] = Exam(
 OUTSIDE = (MOTORS, ACTION)
 """What is read, or used, by somebody outside the design."""
 MOST_JOBS = 2
+INNER_JOBS = frozenset(("estimates the state", "plans paths", "navigates", "controls the motors"))
+"""Jobs that others depend on: where one is missing, how the rest is divided can still be seen."""
 MOST_FAULTS = 4
 
 READ_NODES = "Chapter 5, “Nodes: the processing units”"
@@ -57,6 +59,12 @@ def require_none(faults: str, *, expected: str) -> None:
     """Fail if there are any faults."""
     if faults:
         raise Failed(expected=expected, actual=faults)
+
+
+def require_commands(jobs: Jobs) -> None:
+    """Fail if no node commands the motors: there is nothing to be followed to them."""
+    if not jobs.controllers:
+        raise Failed(expected=f"A node publishes {MOTORS}.", actual=f"No node publishes {MOTORS}.")
 
 
 @EXAM.check(
@@ -249,7 +257,8 @@ def links_connect(design: ObservedDesign) -> None:
 
 
 @EXAM.check(
-    needs=("obstacle_information", "motors_driven"),
+    needs=("obstacle_information",),
+    builds_on=("motors_driven",),
     hints=(
         "Follow the obstacle information to the motors: is there a node that has to ask for it?",
         "An answer is as old as the question. What changes all the time is pushed, not fetched.",
@@ -265,6 +274,7 @@ def streams_are_topics(design: ObservedDesign) -> None:
     """
     jobs = Jobs(design.graph)
     topics = jobs.obstacle_topics
+    require_commands(jobs)
     if not any(jobs.leads_to_motors(topic, STREAMS) for topic in topics):
         raise Failed(
             expected=f"From the obstacle information to {MOTORS} there are topics (or action "
@@ -275,7 +285,8 @@ def streams_are_topics(design: ObservedDesign) -> None:
 
 
 @EXAM.check(
-    needs=("navigation_action", "pose_published", "planner_service", "motors_driven"),
+    needs=("design_runs",),
+    builds_on=("navigation_action", "pose_published", "planner_service", "motors_driven"),
     hints=(
         "Which node would you have to change for a new LIDAR, and which for a new motor?",
         "List for each node which of the six jobs it does.",
@@ -288,11 +299,18 @@ def jobs_divided(design: ObservedDesign) -> None:
 
     A node that does it all cannot be tested in parts, and when it fails the whole robot fails.
     """
+    jobs_of = Jobs(design.graph).of_each_node()
     busy = [
         f"{name_nodes([node])} {as_phrase(jobs)}."
-        for node, jobs in Jobs(design.graph).of_each_node().items()
+        for node, jobs in jobs_of.items()
         if len(jobs) > MOST_JOBS
     ]
+    done = {job for jobs in jobs_of.values() for job in jobs}
+    if len(lacking := INNER_JOBS - done) > 1:
+        raise Failed(
+            expected="The robot's jobs are done by somebody.",
+            actual=f"No node {as_phrase(sorted(lacking), 'or')}.",
+        )
     require_none(
         " ".join(busy),
         expected="No node drives sensors, estimates, detects, plans, navigates and controls: two "
@@ -301,7 +319,8 @@ def jobs_divided(design: ObservedDesign) -> None:
 
 
 @EXAM.check(
-    needs=("navigation_action", "motors_driven"),
+    needs=("design_runs",),
+    builds_on=("navigation_action", "motors_driven"),
     hints=(
         "Follow the goal from navigate_to from node to node: which one does not pass it on?",
         "Each link on the way must carry data: a message without a number or a text cannot.",
@@ -315,6 +334,7 @@ def goal_reaches_motors(design: ObservedDesign) -> None:
     This is the dye test: each node passes on marked messages, and the mark of a goal has to arrive
     at the motors. Lines on a drawing carry nothing; links do.
     """
+    require_commands(Jobs(design.graph))
     if (goals := design.goals(ACTION)) is None:
         raise Failed(
             expected=f"A goal of {ACTION} can bear a mark: it holds a number or a text.",
@@ -349,7 +369,8 @@ def require_plans(design: ObservedDesign) -> None:
 
 
 @EXAM.check(
-    needs=("obstacle_information", "motors_driven"),
+    needs=("obstacle_information",),
+    builds_on=("motors_driven",),
     hints=(
         "Follow a scan from /scan to the obstacle information, and from there to the motors.",
         "Somewhere a node reads and does not write, or a message has no room for what it says.",
@@ -363,7 +384,9 @@ def scan_reaches_motors(design: ObservedDesign) -> None:
 
     The second dye test: a scan that never gets to the motors is an obstacle that the robot hits.
     """
-    every = Jobs(design.graph).obstacle_topics
+    jobs = Jobs(design.graph)
+    require_commands(jobs)
+    every = jobs.obstacle_topics
     topics = [topic for topic in every if is_installed(topic.types)]
     if not topics:
         raise Failed(
@@ -374,7 +397,7 @@ def scan_reaches_motors(design: ObservedDesign) -> None:
     require_stream(design, follow_scan(design, topics))
     now = design.read_again()
     faults = find_link_faults(now.added_since(design.graph), OUTSIDE)
-    if len(now.topic(MOTORS).written_by) > 1:
+    if len(now.topic(MOTORS).written_by) > max(1, len(jobs.controllers)):
         faults.insert(0, why_no_driving(Jobs(now)))
     if faults:
         raise Failed(

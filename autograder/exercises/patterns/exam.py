@@ -2,8 +2,8 @@
 
 Every bound below stands in the task's fine print. What is right in more than one way: the position
 as a service or as a topic, a parameter of the node or a service of its own, a battery level that is
-durable, published again and again, or told whoever joins. The key of the choices is not here: it
-comes from the hidden cell.
+durable, published again and again, or told each one that joins. The key of the choices is not here:
+it comes from the hidden cell.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ EXAM: Exam[Robot] = Exam("patterns", Robot, fresh_parts=True, read=READ_PATTERNS
 def node_starts(robot: Robot) -> str:
     """The node starts.
 
-    Whoever wants to know or command anything finds nobody if the robot's interface is not there.
+    Nodes that want to know or command anything find nobody if the robot's interface is not there.
     """
     robot.start()
     await_patterns(robot)
@@ -100,14 +100,14 @@ def camera_streams(robot: Robot) -> None:
 @EXAM.check(
     needs=("node_starts",),
     hints=(
-        "Is whoever wants to know told anything at all, and is it where the robot is now?",
+        "Is a node that wants to know told anything at all, and is it where the robot is now?",
         "Read `self.position` at the moment when somebody asks, not before.",
-        "Answer whoever asks, with success set to True and message to str(self.position); or tell "
+        "Answer each request, with success set to True and message to str(self.position); or tell "
         "everybody at least twice a second.",
     ),
 )
 def position_answered(robot: Robot) -> str:
-    """Whoever wants to know the robot's position gets the present one.
+    """A node that wants to know the robot's position gets the present one.
 
     A planner that starts from where the robot was a while ago plans through the shelf beside it.
     """
@@ -126,8 +126,8 @@ def position_answered(robot: Robot) -> str:
     robot.found.position_by = pattern
     if pattern == "topic":
         return (
-            "As a topic: that is how most robots do it (odometry), and whoever listens always "
-            "knows. The chapter asks for it by a service, which suits those who need it once."
+            "As a topic: that is how most robots do it (odometry), and all who listen always "
+            "know. The chapter asks for it by a service, which suits those who need it once."
         )
     return (
         "As a service, the chapter's answer. Most robots offer the position as a topic, too "
@@ -138,7 +138,7 @@ def position_answered(robot: Robot) -> str:
 @EXAM.check(
     needs=("node_starts",),
     hints=(
-        "Which values are accepted, which are refused, and what is whoever asked told of that?",
+        "Which values are accepted, which are refused, and what is the sender told of that?",
         "declare_parameter gives your node all that it takes; a range or a callback refuses.",
         "declare_parameter('max_speed', 0.5, ParameterDescriptor(floating_point_range=[...])) with "
         "a FloatingPointRange from 0.1 to 1.0.",
@@ -188,7 +188,7 @@ def parameter_changes(robot: Robot) -> str:
 def battery_broadcast(robot: Robot) -> None:
     """A new battery level reaches everybody who listens.
 
-    The planner, the display and the log all need it; whoever is forgotten strands the robot.
+    The planner, the display and the log all need it; one that is forgotten strands the robot.
     """
     require_pattern(robot, "battery")
     robot.require_heard(CHARGE)
@@ -235,7 +235,7 @@ def battery_late_joiner(robot: Robot) -> str:
 def navigation_drives(robot: Robot) -> None:
     """A navigation goal is driven to, with a report at each station and at the end.
 
-    A drive takes minutes: whoever sent the robot wants to know how far it is, and that it is there.
+    A drive takes minutes: its sender wants to know how far it is, and that it is there.
     """
     require_pattern(robot, "navigation")
     start = robot.draws.whole("the first station", START, START, MOST_STARTS)

@@ -1,7 +1,7 @@
 """The five scenarios: what each needs, what is asked about it, and what each pattern would mean.
 
 Which choice is right is in the hidden cell's key and nowhere else. No text of a question names a
-pattern, so whoever reads all of them still has to think; the meanings say who asks, who waits, how
+pattern, so who reads all of them still has to think; the meanings say who asks, who waits, how
 often, and what nobody would know.
 """
 
@@ -35,8 +35,8 @@ SCENARIOS: dict[str, Scenario] = {
     "position": Scenario(
         "robot/position",
         {"service": "std_srvs/srv/Trigger", "topic": "std_msgs/msg/Float64"},
-        "Whoever wants to know the position gets it in metres, at most 0.5 s old, also while the "
-        "robot stands still.",
+        "A node that wants to know the position gets it in metres, at most 0.5 s old, also while "
+        "the robot stands still.",
     ),
     "camera": Scenario(
         "robot/camera",
@@ -51,13 +51,13 @@ SCENARIOS: dict[str, Scenario] = {
     "parameters": Scenario(
         "robot/max_speed",
         {"service": SET_PARAMETERS},
-        "Whoever changes max_speed is told whether the new value was accepted, or why not.",
+        "A node that changes max_speed is told whether the new value was accepted, or why not.",
     ),
     "battery": Scenario(
         "robot/battery",
         {"topic": "sensor_msgs/msg/BatteryState"},
-        "Whoever listens to robot/battery knows a new level within 1 s. Its percentage is 0.0 to "
-        "1.0.",
+        "A node that listens to robot/battery knows a new level within 1 s. Its percentage is "
+        "0.0 to 1.0.",
     ),
 }
 
@@ -67,19 +67,19 @@ CHOICES = Choices(
     {
         "position": Question(
             "Requesting the robot's position: the pattern fits.",
-            "Whoever asks goes on with the answer, so it has to be there at once.",
+            "A node that asks goes on with the answer, so it has to be there at once.",
             (
                 "Who begins the exchange, and how many are interested in this answer?",
                 "How long does it take until the answer is there?",
                 "There is nothing to wait for, no progress to hear of, and nothing to call off.",
             ),
             {
-                "topic": "Nobody has to ask: the newest message answers whoever listens, as "
-                "odometry does on most robots. Whoever needs one position must subscribe and wait "
-                "for a message.",
-                "service": "Whoever needs one position asks for it, waits a moment, and goes on "
-                "with an answer as fresh as the question.",
-                "action": "For an answer that is there at once, whoever asks would send a goal, "
+                "topic": "Nobody has to ask: the newest message answers all who listen, as "
+                "odometry does on most robots. A node that needs one position must subscribe and "
+                "wait for a message.",
+                "service": "A node that needs one position asks for it, waits a moment, and goes "
+                "on with an answer as fresh as the question.",
+                "action": "For an answer that is there at once, a node would send a goal, "
                 "wait for it to be accepted, and then wait for a result; there is no progress to "
                 "report and nothing to call off.",
             },
@@ -111,12 +111,12 @@ CHOICES = Choices(
                 "It takes long, reports on the way, comes to an end, and can be called off.",
             ),
             {
-                "topic": "Whoever sends the robot off would never hear whether anyone took the "
+                "topic": "The sender would never hear whether anyone took the "
                 "goal, how far the robot is, or whether it arrived, and has no way to call off "
                 "this one drive.",
                 "service": "The call would hang for as long as the drive takes, minutes perhaps: "
                 "no word of how far the robot is, and no way to call it back before it arrives.",
-                "action": "Whoever sends the robot off hears how far it is and whether it "
+                "action": "The sender hears how far the robot is and whether it "
                 "arrived, and can call it off on the way.",
             },
         ),
@@ -129,9 +129,9 @@ CHOICES = Choices(
                 "It is quick, it is between two, and it needs a yes or a no.",
             ),
             {
-                "topic": "Whoever sends a new value would never hear whether it holds: a bad one "
+                "topic": "The sender of a new value would never hear whether it holds: a bad one "
                 "would be dropped without a word, or driven with.",
-                "service": "Whoever changes a value asks for it and hears at once whether it "
+                "service": "The node that changes a value asks for it and hears at once whether it "
                 "holds, or why it does not.",
                 "action": "A change is done as soon as it is asked for: there is no progress to "
                 "watch and nothing to call off, but every change would take three exchanges "

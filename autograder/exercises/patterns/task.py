@@ -15,74 +15,40 @@
 #
 # ![A robot on a line of stations, 1 m apart; on an operator's panel its position, its picture, the station to drive to, its highest speed and its battery level.](patterns.svg)
 #
-# A delivery robot follows a line through a warehouse, with stations 0, 1, 2, ... on it, 1 m apart.
-# Map display, remote control and fleet manager deal with it in five ways. You **choose** a pattern
-# for each, then **build** the node that offers all five. This takes about 90 minutes.
+# A delivery robot drives along a line of stations 0, 1, 2, ..., 1 m apart. Others deal with it in five
+# ways. You **choose** a pattern for each, then **build** the node that offers all five. This takes
+# about 90 minutes.
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "patterns-must-do", "locked": true, "schema_version": 3, "solution": false}
 # ## What it must do
 #
-# - **Position** (`robot/position`): whoever wants to know gets it in metres, at most 0.5 s old.
+# - **Position** (`robot/position`): a node that needs it has it in metres, at most 0.5 s old.
 # - **Camera** (`robot/camera`): 10 pictures a second.
 # - **Navigation** (`robot/navigate`): somebody names a station further on, and the robot drives there
-#   at `max_speed`. They hear at each station all those passed so far, and at the end, when the robot
-#   has stopped, all of the drive. Is the aisle blocked, it waits. Called off, it stops where it is,
-#   within 0.5 s.
-# - **Parameters** (`max_speed`): the highest speed, at first 0.5 m/s. Whoever changes it is told
-#   whether the new value was accepted: 0.1 to 1.0 is, and holds from the next drive on; all else is
-#   refused with a reason.
-# - **Battery** (`robot/battery`): whoever listens knows a new level within 1 s; so does whoever joins
-#   later.
-# - While the robot drives, the other four go on.
+#   at `max_speed`. They hear at each station all those passed, and all at the end, when it has
+#   stopped. It waits in a blocked aisle. Called off, it stops within 0.5 s.
+# - **Parameters** (`max_speed`): at first 0.5 m/s. 0.1 to 1.0 is accepted, from the next drive on;
+#   all else is refused with a reason.
+# - **Battery** (`robot/battery`): listeners know a new level within 1 s, also those who join later.
+# - While it drives, the other four go on.
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "patterns-try-it", "locked": true, "schema_version": 3, "solution": false}
 # ## Try it
 #
-# The robot of the course can be yours. Once the cells below have run, wire it to your node, in a cell
-# of your own:
+# In a cell of your own, once the cells below have run:
 #
 # ```python
 # import course
-# from geometry_msgs.msg import Twist
-# from nav_msgs.msg import Odometry
 #
-#
-# class Wires(Node):
-#     """Connects the robot of the course with the `hardware/...` topics of this exercise."""
-#
-#     def __init__(self):
-#         super().__init__('wires')
-#         self.speed = 0.0
-#         self.places = self.create_publisher(Float64, 'hardware/position', 10)
-#         self.levels = self.create_publisher(Float64, 'hardware/charge', 10)
-#         self.wheels = self.create_publisher(Twist, 'cmd_vel', 10)
-#         self.create_subscription(Odometry, 'wheel/odometry', self.on_moved, 10)
-#         self.create_subscription(BatteryState, 'battery_state', self.on_level, 10)
-#         self.create_subscription(Float64, 'hardware/speed', self.on_speed, 10)
-#         self.create_timer(0.1, self.turn_wheels)  # the motors stop if nobody speaks for 0.5 s
-#
-#     def on_moved(self, msg):
-#         self.places.publish(Float64(data=msg.pose.pose.position.x))
-#
-#     def on_level(self, msg):
-#         self.levels.publish(Float64(data=msg.percentage))
-#
-#     def on_speed(self, msg):
-#         self.speed = msg.data
-#
-#     def turn_wheels(self):
-#         command = Twist()
-#         command.linear.x = self.speed
-#         self.wheels.publish(command)
-#
-#
-# world = course.world("warehouse")  # the robot stands at station 1; straight on is the way to 8
-# course.run(Wires)
-# course.run(RobotInterface, threads=4)
+# world = course.world("aisle")  # its robot is the hardware; it stands at station 0
+# robot = course.run(RobotInterface, threads=4)
+# course.session().panel(
+#     world, "robot/navigate", "robot/position", robot, "robot/battery", "robot/camera"
+# )
 # ```
 #
-# Then use it as an operator would (see “Look inside”, below), and drag something into the aisle while
-# it drives.
+# Each instrument is what you have built; a topic takes `%ros topic pub --once robot/navigate
+# std_msgs/msg/Int32 "data: 3"`. Drag something into the aisle.
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "patterns-fine-print", "locked": true, "schema_version": 3, "solution": false}
 # <details><summary>What exactly is examined</summary>
@@ -115,8 +81,8 @@
 # **Position** (2 points)
 #
 # - The hardware says three times where the robot is, within the first metre, once each. Within 0.5 s
-#   whoever asks, or has listened, knows each to within 1 cm. So does who begins to listen after the
-#   last, while the robot stands.
+#   a node that asks, or has listened, knows each to within 1 cm. So does one that begins to listen
+#   after the last, while the robot stands.
 # - An answer has `success=True` and the number in its `message`, alone or among words: of up to 12
 #   numbers in the first 1000 characters one is right.
 #
@@ -143,7 +109,7 @@
 #   who listens from the beginning has it as `percentage`, to within 0.001.
 # - Who joins later (1 point, at grading; needs the first): somebody who joins 8 s after the last
 #   change has the level within 1 s, in the newest message. Either it is kept for them (then they ask
-#   for it: TRANSIENT_LOCAL and RELIABLE on both sides; whoever does not ask gets nothing, and that is
+#   for it: TRANSIENT_LOCAL and RELIABLE on both sides; who does not ask gets nothing, and that is
 #   right), or it comes again within 1 s, for two who join one after the other (the second time within
 #   1.05 s).
 #
@@ -352,7 +318,7 @@ class RobotInterface(Robot):
         described = ParameterDescriptor(floating_point_range=[limits])
         self.declare_parameter('max_speed', 0.5, described)
 
-        # Durable: whoever joins late is handed the last level at once.
+        # Durable: a node that joins late is handed the last level at once.
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.battery = self.create_publisher(BatteryState, 'robot/battery', latched)
 
@@ -402,8 +368,8 @@ class RobotInterface(Robot):
 # (so it answers others, too, while a goal is under way), and then use it as an operator would.
 # `course.session().service(name)` and `course.session().action(name)` are forms for a service and an
 # action, `course.session().timeline(name)` shows a topic's messages,
-# `course.session().parameters("robot_interface")` a node's parameters: whichever you chose. No motor
-# turns here, so a drive ends when you cancel it, or move the robot yourself:
+# `course.session().parameters("robot_interface")` a node's parameters: whichever you chose. Without a
+# world no motor turns, so a drive ends when you cancel it, or move the robot yourself:
 # `%ros topic pub --once /hardware/position std_msgs/msg/Float64 "data: 3.0"` puts it at 3 m.
 
 # %% nbgrader={"grade": true, "grade_id": "patterns-visible", "locked": true, "points": 0, "schema_version": 3, "solution": false}

@@ -35,7 +35,7 @@ from autograder.observe.nouns import Parameter
 EXAM: Exam[CameraRig] = Exam(
     "resources",
     CameraRig,
-    read="Chapter 5, “Nodes: lifecycle management” and “Nodes: resource management”",
+    read="Chapter 5, “Nodes: the processing units”: “Lifecycle management”, “Resource management”",
 )
 READ_MANAGED = "ROS 2 design, “Managed nodes”"
 FASTEST_HZ = 30.0
@@ -405,6 +405,7 @@ def managed_shutdown(rig: CameraRig) -> None:
                 if state == "active":  # by now the middleware has the threads that it keeps
                     rig.require_threads_ended(threads, when)
                 if end == "shutdown":
+                    camera.require_callbacks_ended(when)
                     rig.stop(MANAGED, bare=True)  # finalized is a state, too
                 rig.require_gone(camera.node, DESTROYED)
                 rig.destroy_again(MANAGED)

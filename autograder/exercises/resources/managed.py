@@ -84,6 +84,15 @@ class ManagedCamera(ObservedCamera):
         self.require_closed(when)
         self.require_publishers(0, when)
 
+    def require_callbacks_ended(self, when: str) -> None:
+        """Fail if a callback goes on and raises, as one does that still wants pictures."""
+        self.rig.advance(TICK_S)
+        if note := self.rig.error_note():
+            raise Failed(
+                expected=f"{when} no callback of the node's goes on.",
+                actual=f"One went on{note}.",
+            )
+
     def require_still_held(self) -> None:
         """Fail unless a node that was deactivated has kept its camera open, and its publisher.
 

@@ -15,45 +15,36 @@
 #
 # ![One life of the camera driver after the other: a driver that leaks leaves a thread and two open files each time, one that cleans up leaves nothing](resources.svg)
 #
-# A robot's camera driver is restarted after every update and unplugged cable. What one life leaves
-# behind (a thread, an open device, memory) is still there in the next, until the robot stands
-# still. You write it twice, as a plain and as a managed (lifecycle) node. This takes about 90
-# minutes.
+# A camera driver is restarted after every unplugged cable. What its lives leave behind adds up, until
+# the robot stands still. You write it as a plain and as a managed (lifecycle) node. This takes about
+# 90 minutes.
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "resources-must-do", "locked": true, "schema_version": 3, "solution": false}
 # ## What it must do
 #
 # - **`CameraDriver(device)`** opens its camera and publishes 10 pictures a second on
-#   `camera/image`. A number on `camera/zoom` sets the zoom from then on; the service
-#   `camera/snapshot` publishes one more picture, then answers.
-# - **A start that fails** raises, and leaves nothing: no node, no thread, no open camera.
+#   `camera/image`. A number on `camera/zoom` sets the zoom; the service `camera/snapshot` publishes
+#   one more picture, then answers.
+# - **A start that fails** raises, and leaves no node, thread or open camera.
 # - **`destroy_node()`** gives everything back within 1 s, also when called twice, or while a
-#   callback waits for the camera. 50 lives leave no thread, no open file, and less than 100 KiB
-#   each.
-# - **`ManagedCamera()`** holds nothing when `unconfigured` or `finalized`, its open camera and its
-#   publisher when `inactive`, and streams only when `active`: `rate` pictures a second (above 0, up
-#   to 30).
-# - A configuration that is not possible leaves it `unconfigured`; a stream that does not start ends
-#   there or in `finalized`. A shutdown gives everything back, whatever the state.
+#   callback waits for the camera. 50 lives leave no thread or open file, and less than 100 KiB each.
+# - **`ManagedCamera()`** holds nothing when `unconfigured` or `finalized`, its camera and publisher
+#   when `inactive`, and streams only when `active`, at its `rate` (above 0, up to 30 Hz).
+# - A bad configuration leaves it `unconfigured`; a stream that does not start ends there or in
+#   `finalized`. A shutdown gives everything back.
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "resources-try-it", "locked": true, "schema_version": 3, "solution": false}
 # ## Try it
 #
-# See what five lives leave behind, in a cell of your own, once you have run the cells of the plain
-# node. The stub leaves a thread and two open files each time. What does yours leave?
+# In a cell of your own, once the cells of the plain node have run:
 #
 # ```python
 # import course
 #
-# for life in range(5):
-#     node = course.run(CameraDriver, f'front{life}')
-#     course.next_message(Image, 'camera/image')
-#     course.stop(node)
-#     print(threading.active_count(), 'threads,', len(os.listdir('/proc/self/fd')), 'open files')
+# course.lives(lambda life: CameraDriver(f'front{life}'), 'camera/image')
 # ```
 #
-# `CameraDriver('stuck')`, in a cell of its own, is a start that fails. (`course.run` would hide a
-# leak there: it takes half-made nodes down for you.)
+# `CameraDriver('stuck')` alone is a start that fails. (`course.run` would tidy up for you.)
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "resources-fine-print", "locked": true, "schema_version": 3, "solution": false}
 # <details><summary>What exactly is examined</summary>
@@ -157,7 +148,8 @@
 #   that it started has ended, too, and with a good camera pictures come at the right rate.
 # - **Shut down** (hidden). After a shutdown from `unconfigured`, `inactive` and `active`, and after
 #   `destroy_node()` in each of these states, the camera is closed and there is no publisher; every
-#   thread that was started has ended (seen in `active`). A helper node that the node makes for a
+#   thread that was started has ended (seen in `active`). After a shutdown no callback goes on that
+#   raises, such as a timer's that still wants pictures. A helper node that the node makes for a
 #   state goes with a shutdown as well. After `destroy_node()`, in `finalized`, too, no node and no
 #   endpoint is left, and a second call does not raise.
 #

@@ -34,7 +34,7 @@ from autograder.observe.phrases import say_words
 from autograder.observe.several_nodes.clock_bound_node import WallWait
 from autograder.observe.several_nodes.multi_node_rig import Nodes, several_nodes
 
-READ_SERVICES = "Chapter 5, “Services: error handling”"
+READ_SERVICES = "Chapter 5, “Services: synchronous request-response”: “Error handling”"
 EXAM: Exam[Nodes] = Exam("safety", several_nodes(program_trials.TRIALS), read=READ_SERVICES)
 
 COARSE_S = 0.5  # between two looks where it does not matter when exactly something happens
@@ -58,9 +58,10 @@ GOAL_LEFT = (
     "time-out called off?"
 )
 
-READ_GOALS = "Chapter 5, “Actions: goal, feedback, result”"
-READ_CANCELS = "Chapter 5, “Actions: cancellation”"
-READ_STATUS = "Chapter 5, “Actions: goal status”"
+_READ_ACTIONS = "Chapter 5, “Actions: long-running operations with feedback”"
+READ_GOALS = f"{_READ_ACTIONS}: “Goal, feedback, result”"
+READ_CANCELS = f"{_READ_ACTIONS}: “Cancellation”"
+READ_STATUS = f"{_READ_ACTIONS}: “Goal status”"
 READ_ASYNC = "ROS 2 documentation, “Synchronous vs. asynchronous service clients”"
 READ_GROUPS = "ROS 2 documentation, “Using callback groups”"
 
@@ -604,7 +605,7 @@ def goals_lost(nodes: Nodes) -> None:
         "A stop alone does not last: the loop drives on. Tell the loop, too.",
         "Set a flag, and stop the wheels; the loop looks at the flag, aborts the goal, returns.",
     ),
-    read="Chapter 5, “Nodes: lifecycle management”",
+    read="Chapter 5, “Nodes: the processing units”: “Lifecycle management”",
 )
 def drive_shutdown(nodes: Nodes) -> None:
     """A node that is shut down in the middle of a drive leaves the robot standing.

@@ -16,40 +16,41 @@
 # ![A robot with a parcel in its gripper stands still in a hospital corridor, in front of a person: its wheels are jammed](error-handling.svg)
 #
 # A robot carries parcels through a hospital. Its gripper hangs, its wheels jam, requests are
-# nonsense, servers die. You write four nodes that notice each failure, say so, and leave the robot
-# standing. The parts do not depend on each other; all four take about 150 minutes.
+# nonsense, servers die. You write four independent nodes that notice each failure, say so, and leave
+# the robot standing. This takes about 150 minutes.
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "safety-must-do", "locked": true, "schema_version": 3, "solution": false}
 # ## What it must do
 #
-# - **A. `GripperClient`** has the gripper opened and closed. An answer has 1 s; it tries three
-#   times, pausing 0.5 s and 1 s, says what came of it, and its heart beats every 0.5 s.
-# - **B. `SpeedServer`** sets limits of up to 1 m/s and 2 rad/s, and refuses nonsense with a reason.
-# - **C. `NavigationClient`** sends the robot on its way; it gives up after 1 s without an answer,
-#   or 2 s without feedback.
+# - **A. `GripperClient`** has the gripper opened and closed: three tries of 1 s, pauses of 0.5 s
+#   and 1 s, and one word for the outcome. Its heart beats every 0.5 s.
+# - **B. `SpeedServer`** sets limits up to 1 m/s and 2 rad/s, and refuses nonsense with a reason.
+# - **C. `NavigationClient`** sends the robot off; it gives up after 1 s without answer, or 2 s
+#   without feedback.
 # - **D. `NavigationServer`** drives 1 to 10 m at 1 m/s. A cancel ends the drive within 0.5 s,
 #   jammed wheels or a shutdown within 1 s.
-# - Whatever fails in C, and however a drive ends in D: a zero `Twist` on `cmd_vel` stops the robot.
-# - All waiting runs on the node's clock, and no exception leaves a callback.
+# - After each failure in C and each end in D a zero `Twist` on `cmd_vel` stops the robot.
+# - All waiting is on the node's clock; no exception leaves a callback.
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "safety-try-it", "locked": true, "schema_version": 3, "solution": false}
 # ## Try it
 #
-# Once the cells of part D have run, be the dispatcher of a robot in a corridor, in a cell of your
-# own:
+# In a cell of your own, once the cells below have run:
 #
 # ```python
 # import course
 #
-# world = course.world("corridor")         # the robot, seen from above; it listens to cmd_vel
-# course.run(NavigationServer, threads=4)  # your part D drives it
-# course.session().action("drive")         # buttons that send a goal and cancel it
+# world = course.world("corridor")
+# for part in (GripperClient, SpeedServer, NavigationClient, NavigationServer):
+#     course.run(part, threads=4)
+# course.session().panel(world, "drive", "speed/set", "grip/outcome", "navigate/outcome")
 # ```
 #
-# In the middle of a drive cancel it, or jam the wheels (`false` frees them):
+# “Break something” does what the exam does. Ask your nodes by
 #
 # ```python
-# %ros topic pub --once hardware/jammed std_msgs/msg/Bool "data: true"
+# %ros topic pub --once grip/request std_msgs/msg/Bool "data: true"
+# %ros topic pub --once navigate/request std_msgs/msg/Int32 "data: 5"
 # ```
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "safety-fine-print", "locked": true, "schema_version": 3, "solution": false}

@@ -12,10 +12,8 @@ from contextlib import AbstractContextManager
 from typing import Any
 
 from action_msgs.msg import GoalStatus
-from action_msgs.srv import CancelGoal
 from rclpy.action.client import ActionClient
-from rclpy.action.server import ActionServer, CancelResponse, GoalResponse, ServerGoalHandle
-from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.action.server import GoalResponse, ServerGoalHandle
 from rclpy.node import Node
 from rclpy.task import Future
 
@@ -23,6 +21,7 @@ from autograder.observe.examiner.deferred_replies import DeferredReplies
 from autograder.observe.examiner.quiet_node import QuietNode
 from autograder.observe.nouns import Action
 from course.runtime.executor.background import BackgroundExecutor
+from course.runtime.requests.held_action import HeldActionServer
 
 ENDS = {
     GoalStatus.STATUS_SUCCEEDED: "succeeded",
@@ -131,31 +130,16 @@ class ActionClientEnd:
         self._client.destroy()
 
 
-class _HeldServer(ActionServer):
-    """An action server whose answers wait, and that refuses to cancel in so many words.
-
-    Of a refused request to cancel rclpy only leaves the goal out of `goals_canceling`, and the code
-    at ERROR_NONE. By the comments of action_msgs/srv/CancelGoal it has the code ERROR_REJECTED, as
-    rclcpp's servers answer: a client may read either.
-    """
+class _RestingServer(HeldActionServer):
+    """A server whose results wait, too."""
 
     def __init__(self, end: ActionServerEnd, action: Action) -> None:
         self._end = end
         super().__init__(
-            end, action.type, str(action), execute_callback=lambda _: action.type.Result(),
-            goal_callback=end.answer_goal, handle_accepted_callback=end.goals.append,
-            cancel_callback=lambda _: CancelResponse.ACCEPT,
-            callback_group=ReentrantCallbackGroup(),
+            end, action.type, str(action), end,
+            execute_callback=lambda _: action.type.Result(),
+            handle_accepted_callback=end.goals.append,
         )  # fmt: skip
-
-    async def _execute_cancel_request(self, request_header_and_message: Any) -> None:
-        """Answer a refused request here; rclpy deals with one that is accepted."""
-        if not await self._end.refuses_cancel():
-            await super()._execute_cancel_request(request_header_and_message)
-            return
-        header, _request = request_header_and_message
-        answer = CancelGoal.Response(return_code=CancelGoal.Response.ERROR_REJECTED)
-        self._handle.send_cancel_response(header, answer)
 
     async def _execute_get_result_request(self, request_header_and_message: Any) -> None:
         """Wait with a result that is there already: see `ActionServerEnd.release`."""
@@ -182,7 +166,7 @@ class ActionServerEnd(QuietNode):
         self.cancels_at_s: list[float] = []
         self._resting, self._undecided = DeferredReplies(), DeferredReplies()
         self.plan()
-        self._server = _HeldServer(self, served)
+        self._server = _RestingServer(self, served)
 
     def plan(
         self,

@@ -11,10 +11,10 @@ from rclpy.service import Service as RosService
 
 from autograder.observe.examiner.actions import ActionClientEnd
 from autograder.observe.examiner.quiet_node import QuietNode
-from autograder.observe.examiner.services import Request, hold_requests
 from autograder.observe.graph.qos_refusal import find_refusal
 from autograder.observe.nouns import Action, Service, Task, Topic
 from autograder.observe.participants import of_others
+from course.runtime.requests.held_service import Request, hold_requests
 from course.runtime.requests.service_ends import count_known_clients, count_known_servers
 
 # What is offered meets every demand but that of a deadline, so a student's QoS is free.
@@ -118,7 +118,9 @@ class ExaminerEnd(QuietNode):
         if service.name in self._requests:
             return
         requests = self._requests.setdefault(service.name, [])
-        self._serving.append(hold_requests(self, service, requests, lambda: self.now_s))
+        self._serving.append(
+            hold_requests(self, service.type, str(service), requests.append, lambda: self.now_s)
+        )
 
     def requests(self, service: Service) -> list[Request]:
         """Return the requests that came to a service which the examiner plays."""

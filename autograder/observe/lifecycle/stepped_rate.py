@@ -32,7 +32,7 @@ PHASE = 2
 """Steps, in which messages of before may come."""
 AT_ONCE = 3
 """Messages in a step in which one is due, and one of the step before may come."""
-PACES_S = (0.0, 0.6, 2.0)
+PACES_S = (0.0, 0.6, 1.5)
 """Seconds of wall time in which the time passes that is counted."""
 SLICES = 20
 """Of a period, in which time moves on where it does so by and by."""

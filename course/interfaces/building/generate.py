@@ -76,7 +76,9 @@ def parse_once() -> None:
 
 
 def die_with_parent() -> None:
-    """Ask the kernel to end this process when its parent ends, so that no build is orphaned."""
+    """Ask Linux to end this process when its parent ends, so that no build is orphaned."""
+    if sys.platform != "linux":  # there a build goes on to its end
+        return
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 

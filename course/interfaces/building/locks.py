@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import fcntl
 import os
 import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+
+from course.util.operating_system import try_lock
 
 LOCK_DEADLINE_S = 120.0  # seconds to wait for another process's build before building privately
 
@@ -43,7 +44,7 @@ def locked(file: Path, deadline: float | None = None) -> Iterator[None]:
         descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
         _locks.add(descriptor)
         try:
-            if _take_lock(descriptor) and _is_still(file, descriptor):
+            if try_lock(descriptor) and _is_still(file, descriptor):
                 yield
                 return
         finally:
@@ -52,14 +53,6 @@ def locked(file: Path, deadline: float | None = None) -> Iterator[None]:
         if time.monotonic() > end:
             raise TimeoutError(errno.ETIMEDOUT, "another process keeps it locked")
         pause.wait(0.05)
-
-
-def _take_lock(descriptor: int) -> bool:
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True
 
 
 def _is_still(file: Path, descriptor: int) -> bool:

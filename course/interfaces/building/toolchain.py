@@ -69,6 +69,11 @@ def find_toolchain() -> Toolchain:
 
     Raises ``CompilerMissingError`` naming everything that is missing.
     """
+    if sys.platform == "darwin":
+        raise CompilerMissingError(
+            "ROS interfaces are built on Linux only: on a Mac, install "
+            "ros-jazzy-example-interfaces from RoboStack, and define your own ones on Linux."
+        )
     cc, cxx = (
         find_command("CC", ("gcc", "cc", "clang")),
         find_command("CXX", ("g++", "c++", "clang++")),

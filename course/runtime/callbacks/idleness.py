@@ -3,16 +3,16 @@
 A thread that the kernel shows as asleep may wait for what only the next moment of simulated time
 brings. Or it waits for the interpreter's lock, or has been kept from running by other processes:
 then it is about to go on, and time must not move on without it. One look cannot tell these apart;
-a row of looks can, with the lock let go in between (proc(5): `status`, `schedstat`).
+a row of looks can, with the lock let go in between.
 """
 
 from __future__ import annotations
 
-import os
 import platform
 import threading
 import time
-from typing import NamedTuple
+
+from course.util.operating_system import ThreadSample, look_at, system_call_of
 
 PATIENCE_S = 0.2  # s that a callback must have slept
 LOOKS = 40  # that must have found it asleep: on a busy machine PATIENCE_S passes in a few
@@ -24,55 +24,13 @@ _FUTEX = {"x86_64": 202, "aarch64": 98}.get(platform.machine())
 RESTLESS_LOOKS = 8  # looks in a row at which a blocked thread may have stirred: it looks at a clock
 
 
-class ThreadSample(NamedTuple):
-    """One look at a thread: whether it sleeps, how often it has run, and for how long (s)."""
-
-    asleep: bool
-    switches: str
-    worked: float
-
-
-def look_at(native_id: int, before: ThreadSample | None = None) -> ThreadSample:
-    """Look at a thread of this process, last seen as `before`; one that ended is not asleep."""
-    task = f"/proc/self/task/{native_id}"
-    try:
-        status = _read_file(f"{task}/status")
-    except OSError:
-        return ThreadSample(False, "", 0.0)
-    asleep = status.partition("\nState:\t")[2][:1] == "S"
-    switches = status[status.index("voluntary_ctxt") :]
-    if before is not None and asleep and switches == before.switches:
-        return ThreadSample(True, switches, before.worked)  # it has not run since
-    return ThreadSample(asleep, switches, _processor_seconds(task))
-
-
-def _processor_seconds(task: str) -> float:
-    try:
-        return int(_read_file(f"{task}/schedstat").split()[0]) / 1e9
-    except (
-        OSError,
-        ValueError,
-        IndexError,
-    ):  # a kernel without CONFIG_SCHED_INFO: sleeping must do
-        return 0.0
-
-
 def _waits_without_end(native_id: int) -> bool:
     """Return whether a thread waits for a lock, and with no time-out (futex(2))."""
+    call = system_call_of(native_id)
     try:
-        call = _read_file(f"/proc/self/task/{native_id}/syscall").split()
         return int(call[0]) == _FUTEX and int(call[4], 16) == 0
-    except (OSError, ValueError, IndexError):  # it runs, or the kernel does not say
+    except (ValueError, IndexError):  # it runs, or the system does not say
         return False
-
-
-def _read_file(path: str) -> str:
-    """Return what a small file of the kernel's holds; looks are many, and `open` is slower."""
-    file = os.open(path, os.O_RDONLY)
-    try:
-        return os.read(file, 8192).decode("ascii", "replace")
-    finally:
-        os.close(file)
 
 
 class Idleness:

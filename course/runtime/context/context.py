@@ -47,7 +47,7 @@ def open_context(
     if isinstance(peers, str) or not all(isinstance(peer, str) for peer in peers):
         raise SessionError(f'peers is a list of addresses, such as ["192.168.1.7"], not {peers!r}.')
     ensure_log_dir()
-    port_files.remove_abandoned()
+    port_files.remove_abandoned(domain_id)
     arguments = ["--ros-args", "--disable-stdout-logs", "--disable-external-lib-logs"]
     # rclpy 7.1 leaves this service of a destroyed node on the graph, until the context ends.
     arguments += ["-p", "start_type_description_service:=false"]

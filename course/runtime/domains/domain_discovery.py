@@ -13,18 +13,17 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from course.runtime.domains.leases import MAX_DOMAIN, MIN_DOMAIN, DomainLease, lease_address
+from course.runtime.domains import port_bases
+from course.runtime.domains.leases import DomainLease, leasable_domains, lease_claim
+from course.util.operating_system import Claim, bind_anywhere, new_socket
 
 ANSWER_TIMEOUT_S = 0.5
 """Seconds within which a session answers, unless its process is stopped."""
-
-DOMAINS: Sequence[int] = range(MIN_DOMAIN, MAX_DOMAIN + 1)
-"""The domains whose sessions are asked: all that a session can lease."""
 
 MOST_NAMES = 100
 _MOST_BYTES = 64 * 1024
@@ -34,11 +33,15 @@ Offers = Callable[[list[str]], Mapping[str, list[str]]]
 
 
 class OtherSession(NamedTuple):
-    """A session of another program: its domain, the program's name, and what it offers of it."""
+    """A session of another program: its domain, the program's name, and what it offers of it.
+
+    With another port base than this process's it cannot be joined (`port_bases`).
+    """
 
     domain_id: int
     program: str
     offers: dict[str, list[str]]
+    port_base: int
 
 
 class Answering:
@@ -56,8 +59,9 @@ class Answering:
     def stop(self) -> None:
         """Answer no more. Idempotent."""
         self._stopping = True
-        with suppress(OSError):  # it is closed
-            self._lease.socket.shutdown(socket.SHUT_RD)
+        sock = self._lease.socket
+        with suppress(OSError):  # it is closed, or has questions left to wake up for
+            sock.sendto(b"", socket.MSG_DONTWAIT, sock.getsockname())
         self._thread.join(1.0)
 
     def _answer_questions(self) -> None:
@@ -73,7 +77,10 @@ class Answering:
     def _make_reply(self, question: bytes) -> bytes:
         names = [name for name in json.loads(question) if isinstance(name, str)]
         found = OtherSession(
-            self._lease.domain_id, _program_name(), dict(self._offers(names[:MOST_NAMES]))
+            self._lease.domain_id,
+            _program_name(),
+            dict(self._offers(names[:MOST_NAMES])),
+            port_bases.current_base(),
         )
         return json.dumps({**found._asdict(), "pid": os.getpid()}).encode()[:_MOST_BYTES]
 
@@ -84,11 +91,10 @@ def ask_other_sessions(
     """Return the sessions of other processes that offer any of ``names``, by domain."""
     wanted = sorted(set(names))[:MOST_NAMES]
     found = []
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as sock:
-        sock.bind("")  # the kernel chooses an address, for the answers
-        waiting = sum(
-            _send_question(sock, json.dumps(wanted).encode(), domain) for domain in DOMAINS
-        )
+    with new_socket() as sock:
+        bind_anywhere(sock)
+        question = json.dumps(wanted).encode()
+        waiting = sum(claim.send(sock, question) for claim in all_claims())
         deadline = time.monotonic() + timeout
         while waiting and (left := deadline - time.monotonic()) > 0:
             sock.settimeout(left)
@@ -102,12 +108,10 @@ def ask_other_sessions(
     return sorted(found)
 
 
-def _send_question(sock: socket.socket, question: bytes, domain_id: int) -> bool:
-    try:
-        sock.sendto(question, socket.MSG_DONTWAIT, lease_address(domain_id))
-    except OSError:  # nobody has leased it, or nobody reads there
-        return False
-    return True
+def all_claims() -> list[Claim]:
+    """Return the claims of all sessions that there may be on this machine."""
+    bases = port_bases.known_bases()
+    return [lease_claim(domain, base) for base in bases for domain in leasable_domains(base)]
 
 
 def _parse_answer(answer: dict[str, Any], wanted: list[str]) -> list[OtherSession]:
@@ -118,7 +122,8 @@ def _parse_answer(answer: dict[str, Any], wanted: list[str]) -> list[OtherSessio
     }
     if not offers or answer["pid"] == os.getpid():
         return []
-    return [OtherSession(int(answer["domain_id"]), str(answer["program"]), offers)]
+    domain, base = int(answer["domain_id"]), int(answer["port_base"])
+    return [OtherSession(domain, str(answer["program"]), offers, base)]
 
 
 def _program_name() -> str:

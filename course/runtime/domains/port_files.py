@@ -14,6 +14,8 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+from course.runtime.domains.rtps_ports import DOMAIN_GAIN, USUAL_BASE
+
 FOLDER = Path("/dev/shm")
 MAKING_S = 1.0
 """Seconds that making a port takes at most; it takes some microseconds."""
@@ -22,13 +24,16 @@ _INITIALISED = (2).to_bytes(4, "little")
 _LOOK_AGAIN_S = 0.01
 
 
-def remove_abandoned(folder: Path = FOLDER) -> None:
-    """Remove the ports that were left half made; wait for one that may still be in the making.
+def remove_abandoned(domain_id: int, folder: Path = FOLDER) -> None:
+    """Remove a domain's ports that were left half made; wait for one that may be in the making.
 
-    Another user's stay: DDS may not open them and goes on without.
+    Another user's stay: DDS may not open them and goes on without. Other domains' ports are not
+    looked at: where kernels are killed, there are thousands of them in time.
     """
-    for path in folder.glob("fastrtps_port*[0-9]"):
-        with suppress(OSError):  # its maker has removed it, or is another user
+    first = USUAL_BASE + DOMAIN_GAIN * domain_id
+    for port in range(first, first + 2 * DOMAIN_GAIN):  # the last participants' are the next one's
+        path = folder / f"fastrtps_port{port}"
+        with suppress(OSError):  # there is none; its maker has removed it, or is another user
             if _is_abandoned(path):
                 path.unlink()
 

@@ -60,10 +60,17 @@ class ExecutorPool:
         """Return whether `thread` belongs to one of the executors."""
         return any(executor.has_thread(thread) for executor in self.all_executors())
 
-    def stop(self, deadline: float) -> list[str]:
-        """Stop them all; return what still runs at `deadline`: the thread, and whose callback."""
+    def stop(self, deadline: float) -> None:
+        """Stop them all; return when no callback runs any more, or at `deadline`."""
         for executor in self.all_executors():
             executor.request_stop()
+        self.find_leaks(deadline)
+
+    def find_leaks(self, deadline: float) -> list[str]:
+        """Return what still runs at `deadline`: the thread, and whose callback.
+
+        To be called once they have been stopped.
+        """
         return [
             f"{thread.name}{_busy_with(executor, thread)}"
             for executor in self.all_executors()

@@ -68,7 +68,8 @@ class WorkerThreads:
         return jobs
 
     def _run_jobs(self) -> None:
-        while (job := self._queue.get()) is not None:
+        # One whose callback went on for long may find a queue that `never_begun` has emptied.
+        while not self._stopping and (job := self._queue.get()) is not None:
             if self._stopping:
                 self._queue.put(job)  # for `never_begun`
                 return

@@ -22,6 +22,7 @@ from course.runtime.executor.blocked import describe_job
 from course.runtime.executor.executor_pool import ExecutorPool
 from course.runtime.nodes import name_conflicts
 from course.runtime.nodes.half_made import HalfMade, Remains
+from course.runtime.nodes.lingering import LingeringCallbacks
 from course.runtime.nodes.uninitialised import (
     describe_missing_init,
     explain_uninitialised,
@@ -34,6 +35,7 @@ from course.runtime.waiting import Pulse, poll_condition
 from course.util import argument_checks
 
 _CALLBACK_GRACE_S = 2.0  # s that stop() and pause() give a callback that is running
+_ENDING_GRACE_S = 1.0  # s that stop() gives it once its node is destroyed, and it can see that
 
 Factory = Callable[..., Node]
 
@@ -140,30 +142,28 @@ class NodeRegistry:
         return node is not None and (node in self.stopped or is_being_destroyed(node))
 
     def stop(self, node: Node) -> None:
-        """Stop spinning `node`, let its running callback end, and destroy it. Idempotent."""
-        if self.let_go(node) and destroy_node(node):
-            self._tell(
-                f"The destroy_node() of {node_name(node)} left it on the graph, and the session "
-                "has taken it off; in a program it stays: let the method end with "
-                "super().destroy_node()."
-            )
+        """Stop spinning `node`, let its running callback end, and destroy it. Idempotent.
 
-    def let_go(self, node: Node) -> bool:
-        """Stop spinning `node`, let its running callback end, and forget it; True if it ran."""
-        with self._lock:
-            entry = self._entries.pop(node, None)
+        A callback that goes on until its node tells it to end has time to do so afterwards.
+        """
+        entry = self._forget_entry(node)
         if entry is None:
-            return False
-        self.stopped.add(node)
-        for job in self._take_out(entry.executor, entry.node):
-            blocked = describe_job(job)  # before its thread is another's business
-            if entry.executor.give_up(job):
+            return
+        lingering = self._give_up_callbacks(entry)
+        try:
+            if destroy_node(node):
                 self._tell(
-                    f"{entry.name} was stopped, but its callback {blocked.what} goes on: it has "
-                    f"been running for {blocked.seconds:.0f} s. {blocked.reason} The session goes "
-                    "on without it; only a restart of the kernel or program ends it for good."
+                    f"The destroy_node() of {entry.name} left it on the graph, and the session "
+                    "has taken it off; in a program it stays: let the method end with "
+                    "super().destroy_node()."
                 )
-        return True
+        finally:
+            self._tell_who_goes_on(entry, lingering, _ENDING_GRACE_S)
+
+    def let_go(self, node: Node) -> None:
+        """Stop spinning `node`, let its running callback end, and forget it. Idempotent."""
+        if entry := self._forget_entry(node):
+            self._tell_who_goes_on(entry, self._give_up_callbacks(entry))
 
     def pause(self, entry: RegisteredNode) -> None:
         """Stop executing callbacks; DDS goes on receiving into the node's queues.
@@ -316,6 +316,23 @@ class NodeRegistry:
             return [
                 node for node in entry.executor.brought_by(entry.node) if node not in self._entries
             ]
+
+    def _forget_entry(self, node: Node) -> RegisteredNode | None:
+        with self._lock:
+            entry = self._entries.pop(node, None)
+        if entry is not None:
+            self.stopped.add(node)
+        return entry
+
+    def _give_up_callbacks(self, entry: RegisteredNode) -> LingeringCallbacks:
+        """Stop spinning a node, and go on without those of its callbacks that do not end soon."""
+        return LingeringCallbacks(entry.executor, self._take_out(entry.executor, entry.node))
+
+    def _tell_who_goes_on(
+        self, entry: RegisteredNode, lingering: LingeringCallbacks, grace_s: float = 0.0
+    ) -> None:
+        for sentence in lingering.describe_after(grace_s, entry.name, self._pulse):
+            self._tell(sentence)
 
     def _take_out(self, executor: BackgroundExecutor, node: Node) -> list[CallbackRun]:
         """Stop spinning a node; return its callbacks that have not ended after some time."""

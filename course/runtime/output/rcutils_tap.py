@@ -11,6 +11,7 @@ import contextlib
 import ctypes
 import functools
 import operator
+import platform
 import threading
 from collections.abc import Iterator
 
@@ -20,9 +21,11 @@ from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.logging import get_logger_level, set_logger_level
 from rclpy.node import Node
 
+from course.interfaces.installed import ament_prefixes
 from course.runtime.callbacks.callback_runs import current_job
 from course.runtime.logs.log_store import store
 from course.runtime.rclpy_fixes.logger_callers import spare_the_next_search
+from course.util import operating_system
 
 # void handler(location, int severity, const char *name, int64 stamp_ns, const char *format,
 #              va_list *arguments): rcutils/logging.h, rcutils_logging_output_handler_t.
@@ -35,13 +38,17 @@ _Handler = ctypes.CFUNCTYPE(
     ctypes.c_char_p,
     ctypes.c_void_p,
 )
-_VA_LIST_BYTES = 24  # System V ABI for x86-64, section 3.5.7
+_VA_LIST_BYTES = 32 if platform.machine() == "aarch64" else 24
+"""Size of a va_list (AAPCS64, section 10.1.5; System V ABI for x86-64, section 3.5.7)."""
+_VA_LIST_IS_POINTER = (platform.system(), platform.machine()) == ("Darwin", "arm64")
+"""Whether it is a plain pointer, which reading does not use up (Apple's ABI for arm64)."""
 _TEXT_BYTES = 4096
 _EVERYBODY = ""  # the logger whose level those without one of their own have
 _MIDDLEWARE = ("rcl", "rcl_action", "rcl_lifecycle", "rcutils", "rmw", "rmw_fastrtps_cpp",
                "rmw_fastrtps_shared_cpp", "rmw_dds_common", "rosidl_typesupport")  # fmt: skip
 
-_rcutils = ctypes.CDLL("librcutils.so")
+_LIBRARY = operating_system.find_library("rcutils", (p / "lib" for p in ament_prefixes()))
+_rcutils = ctypes.CDLL(_LIBRARY)
 _rcutils.rcutils_logging_get_output_handler.restype = ctypes.c_void_p
 _rcutils.rcutils_logging_set_output_handler.argtypes = [ctypes.c_void_p]
 _console = ctypes.cast(_rcutils.rcutils_logging_console_output_handler, ctypes.c_void_p).value
@@ -164,15 +171,22 @@ def keep_every_level(node: Node) -> None:
 
 
 def _format_text(text_format: bytes, arguments: int) -> str:
+    buffer = ctypes.create_string_buffer(_TEXT_BYTES)
+    length = _print_text(buffer, text_format, arguments)
+    if length >= _TEXT_BYTES:
+        buffer = ctypes.create_string_buffer(length + 1)
+        _print_text(buffer, text_format, arguments)
+    return buffer.value.decode("utf-8", "replace")
+
+
+def _print_text(buffer: ctypes.Array[ctypes.c_char], text_format: bytes, arguments: int) -> int:
+    """Print into a buffer; return the length of the whole text, in bytes."""
+    if _VA_LIST_IS_POINTER:
+        first = ctypes.c_void_p.from_address(arguments).value
+        return int(_vsnprintf(buffer, len(buffer), text_format, first))
     # The next handler needs the arguments too, and reading them uses them up: read a copy.
     copy = ctypes.create_string_buffer(ctypes.string_at(arguments, _VA_LIST_BYTES))
-    buffer = ctypes.create_string_buffer(_TEXT_BYTES)
-    length = _vsnprintf(buffer, _TEXT_BYTES, text_format, ctypes.addressof(copy))
-    if length >= _TEXT_BYTES:
-        ctypes.memmove(copy, arguments, _VA_LIST_BYTES)
-        buffer = ctypes.create_string_buffer(length + 1)
-        _vsnprintf(buffer, length + 1, text_format, ctypes.addressof(copy))
-    return buffer.value.decode("utf-8", "replace")
+    return int(_vsnprintf(buffer, len(buffer), text_format, ctypes.addressof(copy)))
 
 
 def _hear_line(
@@ -226,5 +240,5 @@ def _is_ours_to_lower(logger: str) -> bool:
 _hear_in_c = _Handler(_hear_line)  # kept here: C only has its address
 _ours = ctypes.cast(_hear_in_c, ctypes.c_void_p).value
 _hear_again = functools.partial(
-    ctypes.PyDLL("librcutils.so").rcutils_logging_set_output_handler, ctypes.c_void_p(_ours)
+    ctypes.PyDLL(_LIBRARY).rcutils_logging_set_output_handler, ctypes.c_void_p(_ours)
 )

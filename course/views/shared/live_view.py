@@ -108,7 +108,10 @@ class LiveView(ABC):
         return ""
 
     def handle_control(self, message: dict[str, Any]) -> None:  # noqa: B027 - some views have no controls
-        """Do what a control in the browser asks for. Runs in the kernel's main thread."""
+        """Do what a control in the browser asks for.
+
+        Runs in a thread of the kernel's, also while a cell runs.
+        """
 
     @property
     def widget(self) -> LiveWidget:
@@ -175,7 +178,7 @@ class LiveView(ABC):
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         # A script, a test, a grader: nobody could look at a widget. And one that is over says so.
-        if not _has_front_end() or self.end_reason:
+        if not has_front_end() or self.end_reason:
             return {"text/plain": repr(self)}, {}
         bundle = self.widget._repr_mimebundle_(**kwargs)
         data, metadata = bundle if isinstance(bundle, tuple) else (bundle or {}, {})
@@ -187,7 +190,11 @@ class LiveView(ABC):
         data, metadata = self._repr_mimebundle_(**kwargs)
         display(data, metadata=metadata, raw=True)  # type: ignore[no-untyped-call]
         if len(data) > 1:
-            self._copy.show(data["text/plain"], self.picture())
+            self.show_saved_copy()
+
+    def show_saved_copy(self) -> None:
+        """Leave what a saved notebook shows in this view's place under the cell that runs."""
+        self._copy.show(repr(self), self.picture())
 
     def _save_copy(self) -> None:
         if self._widget is not None:
@@ -258,7 +265,7 @@ class LiveView(ABC):
             self._slow_due = 0.0
 
 
-def _has_front_end() -> bool:
+def has_front_end() -> bool:
     """Return whether this code runs in a kernel."""
     from IPython.core.getipython import get_ipython
 

@@ -8,6 +8,8 @@ from pathlib import Path
 import anywidget
 import traitlets
 
+from course.views.shared.comm_route import keep_senders_choice
+
 _STATIC = Path(__file__).parents[1] / "static"
 
 
@@ -32,6 +34,12 @@ class LiveWidget(anywidget.AnyWidget):
     ended = traitlets.Unicode().tag(sync=True)
     notice = traitlets.Unicode().tag(sync=True)
     number = traitlets.Int().tag(sync=True)
+
+    def open(self) -> None:
+        """Open the way to the browser, if that has not been done."""
+        super().open()
+        if self.comm is not None:
+            keep_senders_choice(self.comm)
 
 
 @cache

@@ -19,7 +19,8 @@ MAX_PICTURE_BYTES = 100_000
 
 _STYLE = """
 .jp-OutputArea-child:has(.rosview) + .jp-OutputArea-child:has(.rosview-saved) { display: none; }
-.jp-OutputArea-child:has(+ .jp-OutputArea-child .rosview-saved):not(:has(.rosview)) { display: none; }
+.jp-OutputArea-child:has(.rospanel) ~ .jp-OutputArea-child:has(.rosview-saved) { display: none; }
+.jp-OutputArea-child:has(+ .jp-OutputArea-child .rosview-saved):not(:has(.rosview, .rosview-saved)) { display: none; }
 .rosview-saved pre { max-height: 24em; overflow: auto; }
 .rosview-saved img { max-width: 100%; height: auto; }
 """  # noqa: E501 - a selector stays on one line

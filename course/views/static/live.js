@@ -10,6 +10,8 @@ const SVG = "http://www.w3.org/2000/svg";
 const DEAD =
   "Not live any more: the kernel of this notebook was restarted or has ended. " +
   "Run the cells above again, then this one (menu Run: Run All Above Selected Cell).";
+const BUSY = "The kernel is busy: what you press is carried out when it is free again.";
+const BUSY_MS = 1000; // that a control has waited when that is said
 const ENDINGS = ["terminating", "restarting", "autorestarting", "dead"]; // of a kernel
 const CONFIRM_MS = 200; // between two confirmations: each makes the kernel say "busy" and "idle"
 const FOCUSABLE = "a, button, input, select, summary, textarea, [tabindex]";
@@ -58,12 +60,13 @@ function render({ model, el }) {
       say();
     }
   };
-  const stage = make("fieldset", { class: "rosview-stage", role: "presentation" });
+  const stage = make("fieldset", { class: "rosview-parts", role: "presentation" });
+  const place = make("div", { class: "rosview-stage" }, stage);
   const words = make("pre", { class: "rosview-words", tabindex: "0" });
   const status = make("p", { class: "rosview-status", role: "status" });
   const root = make(
     "section", { class: `rosview rosview-${model.get("kind")}`, "aria-label": view.label },
-    stage,
+    place,
     make("details", {}, make("summary", {}, "In words"), words),
     status,
   );
@@ -71,7 +74,27 @@ function render({ model, el }) {
     root.addEventListener(name, (event) => event.stopPropagation());
   }
   el.append(root);
-  const drawing = view.start(stage, send);
+  // Where the page cannot reach the kernel beside a cell that runs, a control waits for the cell. A
+  // question that follows it is answered when it has been carried out.
+  let question = 0;
+  let busy = false;
+  const control = (message) => {
+    send(message);
+    if (question) return;
+    question = setTimeout(() => {
+      busy = true;
+      say();
+    }, BUSY_MS);
+    send({ hello: true });
+  };
+  const answered = () => {
+    clearTimeout(question);
+    question = 0;
+    busy = false;
+    dead = false;
+    say();
+  };
+  const drawing = view.start(stage, control);
 
   let waiting = 0;
   let confirmed = -CONFIRM_MS;
@@ -81,10 +104,17 @@ function render({ model, el }) {
     const frame = model.get("frame");
     if (Object.keys(frame).length) drawing.draw({ ...model.get("fixed"), ...model.get("slow"), ...frame });
     retell();
+    makeReachable();
     guard(root);
     if (performance.now() - confirmed < CONFIRM_MS) return;
     confirmed = performance.now();
     send({ drawn: model.get("number") });
+  };
+  // What scrolls can be scrolled by keyboard; so can a view whose controls are disabled.
+  const makeReachable = () => {
+    const scrolls = place.scrollWidth > place.clientWidth || place.scrollHeight > place.clientHeight;
+    if (scrolls || stage.disabled) place.tabIndex = 0;
+    else place.removeAttribute("tabindex");
   };
   // Text that somebody has marked, to copy it, stands still until it is let go of.
   const retell = () => {
@@ -100,6 +130,7 @@ function render({ model, el }) {
   // What is drawn to fit its place is drawn again when that changes, also when nothing else comes.
   let width = 0;
   const resized = new ResizeObserver(() => {
+    makeReachable();
     if (width === stage.clientWidth) return;
     width = stage.clientWidth;
     waiting ||= requestAnimationFrame(draw);
@@ -107,10 +138,11 @@ function render({ model, el }) {
   const say = () => {
     const ended = model.get("ended");
     const over = dead ? DEAD : ended;
-    const text = over || model.get("notice");
+    const text = over || (busy && BUSY) || model.get("notice");
     root.classList.toggle("rosview-over", Boolean(over));
     // A fieldset disables what is in it, and what is disabled for reasons of its own stays so.
     stage.disabled = Boolean(over);
+    makeReachable();
     if (status.textContent !== text) status.textContent = text;
   };
   // JupyterLab says that the connection has changed, not how: a kernel that lives answers.
@@ -125,7 +157,7 @@ function render({ model, el }) {
       say();
     }
   };
-  const heard = (message) => message?.here && alive();
+  const heard = (message) => message?.here && answered();
   // The widgets' manager passes restarts on, and neither "Shut Down Kernel" nor a crash.
   const session = model.widget_manager?.context?.sessionContext;
   const kernelStatus = (_, now) => { if (ENDINGS.includes(now)) connection(); };
@@ -143,6 +175,7 @@ function render({ model, el }) {
   resized.observe(stage);
   return () => {
     resized.disconnect();
+    clearTimeout(question);
     cancelAnimationFrame(waiting);
     document.removeEventListener("selectionchange", retell);
     model.off("change:number", refresh);

@@ -31,7 +31,7 @@ function build(stage, frame, id, send) {
   const profiles = make(
     "table", { class: "rostable roslab-profiles" },
     make("thead", {}, make("tr", {},
-      ...["", "writer offers", "reader requests", ""].map((name) => make("th", { scope: "col" }, name)))),
+      ...["policy", "writer offers", "reader requests", "unit"].map((name) => make("th", { scope: "col" }, name)))),
     make("tbody", {}, ...rows),
   );
   const loss = make("input", {

@@ -74,7 +74,9 @@ function block(topic, frame, size) {
     shape("text", { x: LABEL + WIDTH, y: base, class: "rostimeline-label rostimeline-now" }, "now"),
   );
   return make("div", {}, make("p", { class: "rostimeline-title" },
-    make("strong", {}, topic.name), ` ${topic.text}`), svg);
+    make("strong", {}, topic.name), ` ${topic.text}`,
+    ...(topic.newest ? [make("br"), "newest message: ", make("b", { class: "rostimeline-newest" }, topic.newest)] : [])),
+  svg);
 }
 
 /** A label that fits its place: the end of a name tells more than its beginning. */

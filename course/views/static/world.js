@@ -1,10 +1,5 @@
 // A world from above with its controls: buttons, the arrow keys, the pointer.
 
-const FAULTS = [
-  ["gripper", "slow"], ["gripper", "dead"], ["gripper", "refuses"], ["wheels", "jammed"],
-  ["camera", "unplugged"], ["radio", "gone"], ["battery", "low"],
-];
-const SOUND = { gripper: "works", wheels: "free", camera: "works", radio: "there", battery: "normal" };
 const HELP =
   "Arrow keys drive: hold one, and let go to stop. Space presses the emergency stop. Drag an " +
   "obstacle, or move the chosen one by Shift and arrows; a double click adds one, Delete removes it.";
@@ -30,9 +25,9 @@ function build(stage, first, send) {
   const bar = toolbar(state, act);
   const obstacles = obstaclePicker(state, act, painter);
   const facts = factList();
-  const faults = faultButtons(act);
+  const faults = faultButtons(first.floor.faults, act);
   const topics = topicTable(act);
-  const news = make("ul", { class: "rosworld-news", role: "log", "aria-label": "News" });
+  const news = make("ul", { class: "rosworld-news" });
   const problem = make("p", { class: "rosform-problem", role: "alert" });
   const pointer = make("span", { class: "rosworld-pointer" });
   const id = newId();
@@ -54,7 +49,8 @@ function build(stage, first, send) {
         make("p", { class: "rosworld-help", id }, HELP),
         obstacles.element, problem),
       make("div", { class: "rosworld-right" },
-        facts.element, faults.element, make("h4", {}, "News"), news)),
+        facts.element, faults.element, make("p", { class: "rosworld-head" }, "News"),
+        make("div", { role: "log", "aria-label": "News" }, news))),
     make("details", {}, make("summary", {}, "What the topics carry"), topics.element),
   ));
   return {
@@ -116,18 +112,21 @@ function factList() {
   };
 }
 
-function faultButtons(act) {
+/** A button for each thing that can fail and each way in which it does; the first state is sound. */
+function faultButtons(possible, act) {
   let faults = {};
-  const buttons = FAULTS.map(([what, how]) => make("button", {
+  const ways = Object.entries(possible).flatMap(
+    ([what, [sound, ...broken]]) => broken.map((how) => ({ what, how, sound })));
+  const buttons = ways.map(({ what, how, sound }) => make("button", {
     type: "button", "aria-pressed": "false",
-    onclick: () => act({ fault: [what, faults[what] === how ? SOUND[what] : how] }),
+    onclick: () => act({ fault: [what, faults[what] === how ? sound : how] }),
   }, `${what} ${how}`));
   return {
     element: make("div", { class: "rosworld-faults", role: "group", "aria-label": "Faults" },
-      make("h4", {}, "Break something"), ...buttons),
+      make("p", { class: "rosworld-head" }, "Break something"), ...buttons),
     draw(frame) {
       faults = frame.faults;
-      FAULTS.forEach(([what, how], place) => press(buttons[place], faults[what] === how));
+      ways.forEach(({ what, how }, place) => press(buttons[place], faults[what] === how));
     },
   };
 }

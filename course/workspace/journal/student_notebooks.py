@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from course.workspace.journal.time_needed import estimate_minutes
+from course.workspace.journal.time_needed import estimate_minutes, find_minutes
 
 MAX_FILE_BYTES = 64 * 1024 * 1024  # bytes; outputs and pictures are in the file, too
 STUB = "Your answer goes here"
@@ -47,7 +47,7 @@ class StudentNotebook:
         quiz: name of the quiz that it shows; empty if none.
         written: how many of its answers in words have been written.
         to_write: how many answers in words it asks for.
-        minutes: how long it takes to work through, as an estimate.
+        minutes: how long it takes to work through, as its first text says or as an estimate.
         problem: why it cannot be read; empty if it can.
     """
 
@@ -83,11 +83,14 @@ def read_notebook(folder: Path, path: Path) -> StudentNotebook:
         path, titles[0] if titles else path.stem, _find_sections(cells),
         _first_match(_CHECK, code), quiz,
         sum(bool(answer.strip()) and STUB not in answer for answer in answers), len(answers),
-        _estimate_minutes(cells, len(answers), quiz=bool(quiz)),
+        _count_minutes(cells, len(answers), quiz=bool(quiz)),
     )  # fmt: skip
 
 
-def _estimate_minutes(cells: list[_Cell], answers: int, *, quiz: bool) -> int:
+def _count_minutes(cells: list[_Cell], answers: int, *, quiz: bool) -> int:
+    first = next((cell.source for cell in cells if not cell.code), "")
+    if said := find_minutes(first):
+        return said
     words = sum(len(cell.source.split()) for cell in cells if not cell.code and not cell.by_hand)
     run = sum(cell.code for cell in cells if cell.source.strip())
     tasks = sum(cell.code and cell.is_task for cell in cells)

@@ -1,6 +1,8 @@
-"""How long a notebook takes, as an estimate: nobody plans an evening by a number of cells."""
+"""How long a notebook takes, as it says or as an estimate: nobody plans by a number of cells."""
 
 from __future__ import annotations
+
+import re
 
 WORDS_A_MINUTE = 150
 """How fast one reads what one has not read before."""
@@ -18,6 +20,18 @@ QUIZ_MIN = 10.0
 """Minutes for an attempt at a quiz."""
 
 _STEP_MIN = 10
+
+_SAID = re.compile(r"\btakes?\s+about\s+(\d{1,3})\s+(minutes|hours)\b")
+
+
+def find_minutes(text: str) -> int | None:
+    """Return the minutes of the first sentence in ``text`` that says how long something takes.
+
+    >>> find_minutes("You build a node. This takes about 3 hours.")
+    180
+    """
+    said = _SAID.search(text)
+    return said and int(said[1]) * (60 if said[2] == "hours" else 1)
 
 
 def estimate_minutes(words: int, cells: int, tasks: int, answers: int, *, quiz: bool) -> int:

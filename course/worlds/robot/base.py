@@ -63,6 +63,7 @@ class Robot:
         self._command = (0.0, 0.0)
         self._command_steps = _TIMEOUT_STEPS  # since it was given
         self._grip = 1.0 - plan.slip
+        self._most = (MAX_SPEED_MPS, MAX_TURN_RADPS)
 
     @property
     def charge(self) -> float:
@@ -74,12 +75,17 @@ class Robot:
         self._energy_j = share * CAPACITY_J
 
     def drive(self, speed: float, turn: float) -> None:
-        """Take a command: m/s and rad/s, cut to what the base can do."""
+        """Take a command: m/s and rad/s, cut to what the base can do, and to its limits."""
+        fastest, sharpest = self._most
         self._command = (
-            min(max(speed, -MAX_SPEED_MPS), MAX_SPEED_MPS),
-            min(max(turn, -MAX_TURN_RADPS), MAX_TURN_RADPS),
+            min(max(speed, -fastest), fastest),
+            min(max(turn, -sharpest), sharpest),
         )
         self._command_steps = 0
+
+    def limit_speeds(self, speed: float, turn: float) -> None:
+        """Limit later commands to m/s and rad/s, at most what the base can do."""
+        self._most = (min(speed, MAX_SPEED_MPS), min(turn, MAX_TURN_RADPS))
 
     def step(self, floor: Floor, *, at_charger: bool) -> None:
         """Move on by one step."""

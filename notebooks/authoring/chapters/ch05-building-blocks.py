@@ -13,8 +13,8 @@
 # %% [markdown]
 # # Chapter 5: Nodes, Topics, Services - The Building Blocks of ROS 2
 #
-# Run the cell with **Shift+Enter**, click on the floor, and drive with the arrow keys. *Three hours
-# in all; part 1 takes 20 minutes.*
+# Run the cell with **Shift+Enter**, click on the floor, and drive with the arrow keys. *The chapter
+# takes about 3 hours, its part 1 takes 20 minutes.*
 
 # %% tags=["notebook-only"]
 # %load_ext course
@@ -23,8 +23,11 @@ from rclpy.node import Node
 from sensor_msgs.msg import LaserScan
 
 seen = {}
+def look(scan):
+    seen["nearest"] = min(scan.ranges)
+
 watcher = course.run(Node, "watcher")
-watcher.create_subscription(LaserScan, "scan", lambda s: seen.update(nearest=min(s.ranges)), 10)
+watcher.create_subscription(LaserScan, "scan", look, 10)
 course.world("warehouse")
 
 # %% [markdown]
@@ -1582,7 +1585,7 @@ session.diagnose()
 # %% [markdown]
 # ## Part 2 Quiz
 #
-# *Ten minutes.* Five questions to check what stayed. To pass you need **4 of 5**: the mark is 70 %,
+# Five questions to check what stayed. To pass you need **4 of 5**: the mark is 70 %,
 # and 70 % of 5 is 3.5. Answer each in a sentence of your own first, then take
 # **[the quiz](ch05-quiz/quiz.ipynb)**: it asks about the same five things in other words each time,
 # and tells you afterwards why a wrong answer tempts, with a cell that shows it.

@@ -16,6 +16,7 @@
 # Five questions on chapter 5. You pass with four of them fully right, and you can try as often as
 # you like: each new attempt asks other questions about the same five ideas. What counts is the best
 # of your first 20 attempts; what comes after them is practice, and your instructor has a look at it.
+# One attempt takes about 10 minutes.
 #
 # Run the next cell. Nothing is marked before you press *Submit answers*; then you see for each
 # answer what is right about it and, where it is not, what really happens, with code that shows it

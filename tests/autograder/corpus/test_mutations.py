@@ -19,7 +19,11 @@ def changes(text: str) -> set[tuple[str, str]]:
 @pytest.mark.parametrize(
     ("line", "operator", "after"),
     [
-        ("qos = QoSProfile(depth=5)", "number", "qos = QoSProfile(depth=6)"),
+        ("qos = QoSProfile(depth=5)", "depth of a queue", "qos = QoSProfile(depth=1)"),
+        ("qos = QoSProfile(depth=5)", "depth of a queue", "qos = QoSProfile(depth=100)"),
+        ("n.create_subscription(T, 't', f, 10)", "depth of a queue",
+         "n.create_subscription(T, 't', f, 1)"),
+        ("wheels = 4", "number", "wheels = 5"),
         ("x = Policy.RELIABLE", "other policy or end", "x = Policy.BEST_EFFORT"),
         ("self.timer.cancel()", "call left out", "pass"),
         ("await self.client.call_async(r)", "call left out", "pass"),
@@ -34,7 +38,8 @@ def changes(text: str) -> set[tuple[str, str]]:
         ("if done: x = f()", "condition", "if not (done): x = f()"),
         ("def f(a): return a", "reply not returned", "def f(a): return None"),
         ("goal.succeed()", "other policy or end", "goal.abort()"),
-        ("def f(a):\n    x = a", "sleep in a callback", "__import__('time').sleep(2)"),
+        ("def f(a):\n    x = a", "sleep in a callback",
+         "__import__('time').sleep(2); x = a"),
         ("s = 'ä' + str(1)", "number", "s = 'ä' + str(2)"),
     ],
 )  # fmt: skip
@@ -47,11 +52,34 @@ def test_what_would_be_no_mistake_of_a_student_is_left_alone(line: str) -> None:
     assert changes(line) <= {("true or false", "while False: x = y")}
 
 
+def test_what_another_definition_replaces_is_left_alone() -> None:
+    stub = "class Robot(Node):\n    wheels = 4\n"
+    right = "class Robot(Node):\n    wheels = 3\n"
+    assert [m.after for m in find_mutations(stub + right)] == ["wheels = 4"]
+    used = find_mutations(stub + "first = Robot()\n" + right)
+    assert [m.after for m in used if m.operator == "number"] == ["wheels = 5", "wheels = 4"]
+    given = "def f(self):\n    answer = NO\n    answer = 1\n    return answer\n"
+    assert not [m for m in find_mutations(given) if m.before == "answer = NO"]
+
+
+def test_a_mutation_says_in_which_function_it_is() -> None:
+    text = "def stop(self):\n    self.halt()\n\n\ndef end(self):\n    self.halt()\n"
+    left_out = [m.key for m in find_mutations(text) if m.operator == "call left out"]
+    assert left_out == [
+        "call left out in stop: self.halt() -> pass",
+        "call left out in end: self.halt() -> pass",
+    ]
+
+
+def test_the_depth_of_a_publisher_is_free() -> None:
+    assert not changes("p = n.create_publisher(T, 't', 10)")
+
+
 def test_a_mutation_is_known_by_what_it_changes_and_not_by_its_line() -> None:
     (first,) = find_mutations("x = 1")
     (second,) = find_mutations("\n\nx = 1")
     assert (first.line, second.line) == (1, 3)
-    assert first.key == second.key == "number: x = 1 -> x = 2"
+    assert first.key == second.key == "number in x: x = 1 -> x = 2"
 
 
 @pytest.mark.parametrize("exam", sorted(exercises.exercise_names()))

@@ -24,6 +24,7 @@ from autograder.examination.exam import (
     unexamined_verdict,
 )
 from autograder.examination.verdict import CheckResult, Progress, Verdict
+from autograder.examination.verdict_text import Report
 
 
 @contextmanager
@@ -140,9 +141,25 @@ def test_a_check_whose_need_failed_is_not_checked(exam: Exam[list[str]]) -> None
     assert [check.status for check in verdict.checks] == ["passed", "failed", "not_checked"]
     assert (verdict.score, verdict.max_score) == (1.0, 7.0)
     first, second, third = verdict.checks
-    assert (first.title, first.rationale, first.note) == ("It starts.", "Because it must.", "nice")
+    assert (first.title, first.note) == ("It starts.", "nice")
     assert (second.expected, second.actual) == ("left", "right")
     assert "“It runs”" in third.actual
+
+
+def test_only_what_failed_says_why_it_matters_and_how_to_mend_it(exam: Exam[list[str]]) -> None:
+    told = {"rationale": "Because it must.", "hints": ("Look.",), "read": "Chapter 1"}
+    for name, check in exam.checks.items():
+        exam.checks[name] = replace(check, **told)
+    (verdict,) = sit(exam, "visible")
+    passed, failed, unchecked = verdict.checks
+    (broken,) = checks(exam, "hidden")
+    assert broken.status == "grader_error"
+    assert (failed.rationale, failed.hints, failed.read) == tuple(told.values())
+    for check in (passed, unchecked, broken):
+        assert (check.rationale, check.hints, check.read) == ("", (), "")
+    for shown in (repr(Report(verdict)), Report(verdict)._repr_html_()):
+        assert shown.count("Because it must.") == shown.count("why it matters") == 1
+        assert "This needs “It runs” first." in shown
 
 
 def test_what_needs_a_check_that_could_not_be_made_is_not_at_fault(exam: Exam[list[str]]) -> None:

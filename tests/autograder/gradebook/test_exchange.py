@@ -5,11 +5,16 @@ from __future__ import annotations
 import base64
 import re
 import shutil
+import signal
+import subprocess
 import sys
+import time
+from contextlib import suppress
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import nbformat
+import psutil
 import pytest
 from nbgrader.api import Gradebook
 
@@ -127,3 +132,48 @@ def test_work_and_feedback_go_through_the_exchange(
         assert process.returncode != 0
         assert "Permission denied" in err
         assert out == ""
+
+
+def test_a_watch_brings_work_and_feedback_through_the_exchange(
+    released_course: Path, cases: dict[str, Case], tmp_path: Path
+) -> None:
+    people = People(tmp_path, ["teacher", "ada", "bob"])
+    root, exchange = prepare(people, released_course)
+    people.run("teacher", *NBGRADER, "release_assignment", ASSIGNMENT, cwd=root)
+    both(people, "fetch_assignment", ASSIGNMENT)
+    for name in ("ada", "bob"):
+        work(people, name, Course(root), cases["wrong-stub"], f"What {name} thinks.")
+        people.give(name, people[name].home)
+    both(people, "submit", ASSIGNMENT)
+    # Bob hands in for Ada, later than she did.
+    inbound = exchange / "ros2-course" / "inbound"
+    [hers] = inbound.glob("ada+*")
+    [his] = inbound.glob("bob+*")
+    people.run("bob", "cp", "-r", str(his), str(inbound / his.name.replace("bob+", "ada+")))
+
+    watch = people.start(
+        "teacher", *AUTOGRADER, "watch", ASSIGNMENT, "--trust-submissions", "--every", "0.5",
+        cwd=root,
+    )  # fmt: skip
+    released = exchange / "ros2-course" / "feedback"
+    deadline = time.monotonic() + 600
+    try:
+        while not (released.is_dir() and len(list(released.glob("*[!p].html"))) == 4):
+            with suppress(subprocess.TimeoutExpired):
+                watch.wait(0.1)
+            assert watch.poll() is None, watch.communicate()
+            assert time.monotonic() < deadline, "feedback is not released"
+    finally:
+        for process in psutil.Process(watch.pid).children():
+            process.terminate()  # bubblewrap would leave it running
+        said, _ = watch.communicate(timeout=60)
+    assert watch.returncode == 128 + signal.SIGTERM
+    assert "was put there by bob, not by ada: it is left there" in said
+    assert "collected ada, bob; graded ada, bob; released feedback for 2 students" in said
+    assert (root / "submitted" / "ada" / ASSIGNMENT / "timestamp.txt").read_text() == (
+        hers / "timestamp.txt"
+    ).read_text()
+    both(people, "fetch_feedback", ASSIGNMENT)
+    for name in ("ada", "bob"):
+        [page] = (people[name].home / ASSIGNMENT / "feedback").rglob("*.html")
+        assert f"What {name} thinks" in page.read_text(encoding="utf-8")

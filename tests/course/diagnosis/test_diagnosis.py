@@ -7,7 +7,6 @@ import json
 import os
 import re
 import signal
-import socket
 import subprocess
 import threading
 import weakref
@@ -28,8 +27,11 @@ from course import Session
 from course.diagnosis import Diagnosis, nodes
 from course.errors import WaitTimeout
 from course.graph import reader
-from course.runtime.domains import domain_discovery, leases
+from course.runtime.domains import domain_discovery, leases, port_bases
+from course.util.operating_system import bind_anywhere, new_socket
 from tests.robot import Robot
+
+EVERY_CLAIM = domain_discovery.all_claims  # before a fixture hides the others
 
 
 @pytest.fixture(autouse=True)
@@ -350,11 +352,10 @@ def test_what_is_missed_here_is_in_another_notebook(
     start_script: Callable[[str], subprocess.Popen[str]],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    every_domain = range(leases.MIN_DOMAIN, leases.MAX_DOMAIN + 1)
     process = start_script(NEXT_DOOR)
     assert process.stdout is not None
     domain = int(process.stdout.readline())
-    monkeypatch.setattr(domain_discovery, "DOMAINS", every_domain)
+    monkeypatch.setattr(domain_discovery, "all_claims", EVERY_CLAIM)
     session.run(listener, "weather")
     asker = session.run(Node, "asker")
     asker.create_client(SetBool, "gate")
@@ -384,13 +385,14 @@ def test_what_is_missed_here_is_in_another_notebook(
 def test_whoever_asks_nonsense_gets_no_answer_and_does_no_harm(session: Session) -> None:
     session.run(talker)
     session.until(lambda: session.offered(["/scan"]))
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sock:
-        sock.sendto(b"", leases.lease_address(session.domain_id))  # from nowhere
-        sock.bind("")
+    claim = leases.lease_claim(session.domain_id, port_bases.current_base())
+    with new_socket() as sock:
+        claim.send(sock, b"")  # from nowhere
+        bind_anywhere(sock)
         sock.settimeout(10)
         for nonsense in (b"", b"{", b"5", b"[1, null, {}]", b'["not a name", "~"]', b"[" * 9000):
-            sock.sendto(nonsense, leases.lease_address(session.domain_id))
-        sock.sendto(b'["/scan"]', leases.lease_address(session.domain_id))
+            claim.send(sock, nonsense)
+        claim.send(sock, b'["/scan"]')
         while not (answer := json.loads(sock.recv(65536)))["offers"]:
             pass
     assert answer["offers"] == {"/scan": ["/talker"]}

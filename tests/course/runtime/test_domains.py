@@ -9,19 +9,26 @@ import socket
 import pytest
 
 from course.errors import DomainError
-from course.runtime.domains import leases
-from course.runtime.domains.leases import check_domain_id, domains_in_use, lease_domain
+from course.runtime.domains import leases, port_bases
+from course.runtime.domains.leases import check_domain_id, leasable_domains, lease_domain
+from course.runtime.domains.rtps_ports import domains_in_use
 
 
-@pytest.mark.parametrize("domain_id", [0, 1, 101])
+def leave_one(domain_id, monkeypatch):
+    """Let this be the one domain that there is."""
+    monkeypatch.setattr(leases, "leasable_domains", lambda *_: [domain_id])
+    monkeypatch.setattr(port_bases, "known_bases", lambda: (port_bases.current_base(),))
+
+
+@pytest.mark.parametrize("domain_id", [0, 1, 101, 215, 232])
 def test_safe_domains_are_accepted(domain_id):
     assert check_domain_id(domain_id) == domain_id
 
 
-@pytest.mark.parametrize("domain_id", [-1, 102, 232, 233, 10**9])
+@pytest.mark.parametrize("domain_id", [-1, 102, 214, 233, 10**9])
 def test_a_domain_out_of_range_is_one_sentence(domain_id):
     with pytest.raises(
-        DomainError, match=f"domain {domain_id} is out of range: choose .* 0 to 101"
+        DomainError, match=f"domain {domain_id} is out of range: choose .* 0 to 101 or 215 to 232"
     ):
         check_domain_id(domain_id)
 
@@ -37,7 +44,7 @@ def test_leases_are_distinct_and_never_the_default_domain():
     try:
         ids = [lease.domain_id for lease in leases]
         assert len(set(ids)) == 5
-        assert all(1 <= domain_id <= 101 for domain_id in ids)
+        assert all(domain_id in leasable_domains() for domain_id in ids)
     finally:
         for lease in leases:
             lease.release()
@@ -45,8 +52,7 @@ def test_leases_are_distinct_and_never_the_default_domain():
 
 def test_a_released_domain_can_be_leased_again(monkeypatch):
     lease = lease_domain()
-    monkeypatch.setattr(leases, "MIN_DOMAIN", lease.domain_id - 1)
-    monkeypatch.setattr(leases, "MAX_DOMAIN", lease.domain_id)
+    leave_one(lease.domain_id, monkeypatch)
     with pytest.raises(DomainError, match="are taken"):
         lease_domain()
     lease.release()
@@ -65,8 +71,7 @@ def test_a_lease_dies_with_its_process_however_it_ends(start_script, monkeypatch
         "signal.pause()\n"
     )
     domain_id = int(process.stdout.readline())
-    monkeypatch.setattr(leases, "MIN_DOMAIN", domain_id - 1)
-    monkeypatch.setattr(leases, "MAX_DOMAIN", domain_id)
+    leave_one(domain_id, monkeypatch)
     with pytest.raises(DomainError):
         lease_domain()
     process.send_signal(signal.SIGKILL)
@@ -93,8 +98,7 @@ def test_a_forked_child_does_not_keep_a_lease_alive(start_script, monkeypatch):
     try:
         process.kill()
         process.wait()
-        monkeypatch.setattr(leases, "MIN_DOMAIN", domain_id - 1)
-        monkeypatch.setattr(leases, "MAX_DOMAIN", domain_id)
+        leave_one(domain_id, monkeypatch)
         lease_domain().release()
     finally:
         os.kill(child, signal.SIGKILL)

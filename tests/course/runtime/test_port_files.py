@@ -56,7 +56,7 @@ def test_the_port_of_a_running_session_stays(session):
     made = [port.stat().st_ino for port in ports]
     for port in ports:
         age(port, 60)
-    port_files.remove_abandoned()
+    port_files.remove_abandoned(session.domain_id)
     assert [port.stat().st_ino for port in ports] == made
 
 
@@ -65,7 +65,7 @@ def test_one_that_may_be_in_the_making_is_waited_for(tmp_path):
     young.touch()
     done.write_bytes((2).to_bytes(4, "little"))
     made = young.stat().st_mtime
-    port_files.remove_abandoned(tmp_path)
+    port_files.remove_abandoned(0, tmp_path)
     assert time.time() - made >= port_files.MAKING_S
     assert [path.name for path in tmp_path.iterdir()] == ["fastrtps_port7413"]
 
@@ -75,5 +75,15 @@ def test_locks_and_segments_are_no_ports(tmp_path):
     for name in names:
         (tmp_path / name).touch()
         age(tmp_path / name, 60)
-    port_files.remove_abandoned(tmp_path)
+    port_files.remove_abandoned(0, tmp_path)
     assert {path.name for path in tmp_path.iterdir()} == names
+
+
+def test_ports_of_other_domains_are_not_looked_at(tmp_path):
+    other = tmp_path / f"fastrtps_port{USER_PORT + 250 * 7}"
+    other.touch()
+    age(other, 60)
+    port_files.remove_abandoned(3, tmp_path)
+    assert other.exists()
+    port_files.remove_abandoned(7, tmp_path)
+    assert not other.exists()

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
+from typing import ClassVar
 
 import pytest
+import rclpy
 from rclpy.action import ActionServer
+from rclpy.action.server import ServerGoalHandle
 from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
+from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci
 
 from course import Session
 from course.runtime.teardown import destroy_node
+from course.runtime.waiting import Pulse, poll_condition
 
 
 class WithAction(Node):
@@ -118,3 +124,144 @@ def test_a_cleanup_that_fails_the_second_time_is_told_and_nothing_else_suffers(
     other = session.run(Node, "other")
     assert list(session.nodes) == [other.get_fully_qualified_name()]
     assert "raised RuntimeError: called twice" in session.notices[-1]
+
+
+class Endless(Node):
+    """Has a callback, or a thread, that goes on until its node tells it to end."""
+
+    def __init__(self) -> None:
+        super().__init__("endless")
+        self.begun, self.over = threading.Event(), threading.Event()
+        self.create_service(Trigger, "begin", self.serve)
+
+    def work(self) -> None:
+        self.begun.set()
+        poll_condition(self.is_over, 60.0, Pulse())
+
+    def is_over(self) -> bool:
+        return self.over.is_set()
+
+    def serve(self, _request: object, response: Trigger.Response) -> Trigger.Response:
+        return response
+
+    def destroy_node(self) -> None:
+        self.over.set()
+        super().destroy_node()
+
+
+class InAService(Endless):
+    def serve(self, _request: object, response: Trigger.Response) -> Trigger.Response:
+        self.work()
+        return response
+
+
+class InATimer(Endless):
+    def __init__(self) -> None:
+        super().__init__()
+        self.create_timer(0.01, self.work)
+
+
+class InAThread(Endless):
+    """Starts a thread, and joins it in its cleanup."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.thread = threading.Thread(target=self.work)
+        self.thread.start()
+
+    def destroy_node(self) -> None:
+        self.over.set()
+        self.thread.join()
+        super().destroy_node()
+
+
+class InAGoal(Endless):
+    """Leaves its action server to whoever destroys it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.server = ActionServer(self, Fibonacci, "work", self.execute)
+
+    def execute(self, _goal: ServerGoalHandle) -> Fibonacci.Result:
+        self.work()
+        return Fibonacci.Result()
+
+
+class WhileTheGoalIsActive(InAGoal):
+    def execute(self, goal: ServerGoalHandle) -> Fibonacci.Result:
+        self.begun.set()
+        poll_condition(lambda: not goal.is_active, 60.0, Pulse())
+        return Fibonacci.Result()
+
+
+class WhileTheContextIsThere(InAGoal):
+    """Looks at `rclpy.ok()`, as loops in plain programs do."""
+
+    def is_over(self) -> bool:
+        return not rclpy.ok(context=self.context)
+
+
+def begin(session: Session, kind: type[Endless]) -> Endless:
+    """Run a node, and return it once its work has begun."""
+    node = session.run(kind)
+    assert isinstance(node, Endless)
+    if issubclass(kind, InAGoal):
+        session.send_goal(Fibonacci, "work", Fibonacci.Goal(order=3))
+    elif kind is InAService:
+        node.create_client(Trigger, "begin").call_async(Trigger.Request())
+    session.until(node.begun.is_set, timeout=20, what="its work to begin")
+    return node
+
+
+KINDS = [InAService, InATimer, InAThread, InAGoal, WhileTheGoalIsActive]
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("kind", [*KINDS, WhileTheContextIsThere])
+def test_work_that_ends_with_its_node_is_no_leak(
+    kind: type[Endless], threads: int, capfd: pytest.CaptureFixture[str]
+) -> None:
+    before = threading.active_count()
+    session = Session(threads=threads)
+    begin(session, kind)
+    report = session.close()
+    assert (report.leaked, session.errors, session.notices) == ([], [], [])
+    assert threading.active_count() == before
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("kind", KINDS)
+def test_stopping_a_node_ends_its_work_without_a_word(
+    kind: type[Endless], threads: int, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with Session(threads=threads) as session:
+        session.run(Node, "other")
+        begin(session, kind)
+        session.stop(kind)
+        assert (session.notices, session.errors) == ([], [])
+        begin(session, kind)  # in a thread that is free again
+        session.stop(kind)
+        assert session.close().leaked == []
+    assert capfd.readouterr() == ("", "")
+
+
+class Deaf(InATimer):
+    """Hears nothing of its node's end."""
+
+    released: ClassVar[threading.Event] = threading.Event()
+
+    def is_over(self) -> bool:
+        return self.released.is_set()
+
+
+@pytest.mark.parametrize("end", [Session.close, Session.stop])
+def test_work_that_goes_on_without_its_node_is_told(end: Callable[[Session], object]) -> None:
+    Deaf.released.clear()
+    session = Session()
+    begin(session, Deaf)
+    end(session)
+    report = session.close(timeout=0.2)
+    Deaf.released.set()
+    assert "a callback of /endless" in report.leaked[0]
+    assert len(session.notices) == (end is Session.stop)

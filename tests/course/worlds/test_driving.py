@@ -169,3 +169,50 @@ def test_a_low_battery_has_a_tenth_left_and_a_normal_one_is_new(on_floor):
     assert simulation.robot.charge == base.LOW_CHARGE
     simulation.set_fault("battery", "normal")
     assert simulation.robot.charge == 1.0
+
+
+def test_a_speed_that_holds_ends_with_the_next_command(on_floor):
+    simulation = on_floor()
+    simulation.drive_on(0.5)
+    let_pass(simulation, 3.0)
+    assert simulation.robot.speed == 0.5
+    simulation.drive(0.2, 0.0)
+    let_pass(simulation, 0.4)
+    assert simulation.robot.speed == pytest.approx(0.2)
+    let_pass(simulation, 1.0)
+    assert simulation.robot.speed == 0.0
+    for speed in (0.0, math.nan):
+        simulation.drive_on(0.5)
+        simulation.drive_on(speed)
+        let_pass(simulation, 1.0)
+        assert simulation.robot.speed == 0.0
+
+
+def test_a_speed_does_not_hold_beyond_the_emergency_stop(on_floor):
+    simulation = on_floor()
+    simulation.drive_on(0.5)
+    simulation.press_stop()
+    let_pass(simulation, 0.5)
+    simulation.drive_on(0.5)
+    simulation.release_stop()
+    let_pass(simulation, 1.0)
+    assert simulation.robot.speed == 0.0
+
+
+def test_limits_hold_for_later_commands_and_nonsense_is_no_limit(on_floor):
+    simulation = on_floor()
+    simulation.limit_speeds(0.3, 0.5)
+    simulation.limit_speeds(math.nan, 1.0)
+    simulation.limit_speeds(0.8, -1.0)
+    simulation.drive(1.0, -2.0)
+    let_pass(simulation, 0.4)
+    assert (simulation.robot.speed, simulation.robot.turn) == (0.3, -0.5)
+    assert simulation.describe_moment()["news"] == [
+        "The speed limits became 0.3 m/s and 0.5 rad/s at 0.0 s."
+    ]
+    simulation.limit_speeds(9.0, 9.0)
+    simulation.drive(9.0, 0.0)
+    let_pass(simulation, 0.4)
+    simulation.drive(9.0, 0.0)
+    let_pass(simulation, 0.4)
+    assert simulation.robot.speed == 1.0

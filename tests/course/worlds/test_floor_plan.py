@@ -11,8 +11,8 @@ from course.worlds.floor_plan import FloorPlanError, load_floor_plan, plan_names
 SOUND = "name: hall\nsize: [10, 8]\nstart: {x: 2, y: 2}\n"
 
 
-def test_there_are_a_corridor_a_hall_and_a_warehouse():
-    assert plan_names() == ["corridor", "hall", "warehouse"]
+def test_there_are_an_aisle_a_corridor_a_hall_and_a_warehouse():
+    assert plan_names() == ["aisle", "corridor", "hall", "warehouse"]
     warehouse = load_floor_plan("warehouse")
     assert (warehouse.name, warehouse.slip) == ("warehouse", 0.0)
     assert len(warehouse.shelves) == 6
@@ -30,8 +30,8 @@ def test_an_unknown_name_and_an_unknown_path_say_what_there_is(tmp_path: Path):
     with pytest.raises(FloorPlanError) as caught:
         load_floor_plan("warehosue")
     assert str(caught.value) == (
-        "There is no world 'warehosue': there are corridor, hall, warehouse, or give the path of a "
-        "floor plan of your own, such as './my_floor.yaml'. Did you mean 'warehouse'?"
+        "There is no world 'warehosue': there are aisle, corridor, hall, warehouse, or give the "
+        "path of a floor plan of your own, such as './my_floor.yaml'. Did you mean 'warehouse'?"
     )
     with pytest.raises(FloorPlanError, match=r"no floor plan .*none\.yaml: look at its path"):
         load_floor_plan(tmp_path / "none.yaml")
@@ -45,14 +45,16 @@ def test_an_unknown_name_and_an_unknown_path_say_what_there_is(tmp_path: Path):
         ("", "mine.yaml: here must stand fields with their values, such as 'name: my_floor'."),
         ("name: hall\nsize: [10, 8]\n", "mine.yaml, field start: it is missing: add it."),
         (SOUND + "shelfs: []\n", "mine.yaml, field shelfs: there is no such field; there are name, "
-         "size, start, charger, stations, walls, shelves, people, slip: rename or delete it. Did "
-         "you mean 'shelves'?"),
+         "size, start, charger, stations, walls, shelves, people, slip, interfaces: rename or "
+         "delete it. Did you mean 'shelves'?"),
         (SOUND + "people:\n  - {path: [[1, 1], [2, 2]], sped: 1}\n", "mine.yaml, field people 1 "
          "sped: there is no such field; there are path, speed, radius: rename or delete it (and 1 "
          "more). Did you mean 'speed'?"),
         (SOUND + "people:\n  - {path: [[1, 1], [2, 2]], speed: 1, hat: red}\n", "mine.yaml, field "
          "people 1 hat: there is no such field; there are path, speed, radius: rename or delete "
          "it."),
+        (SOUND + "interfaces: [line]\n", "mine.yaml, field stations: a line begins at the first "
+         "station, so write at least one."),
         (SOUND + "people:\n  - {path: [[1, 1], [2, 2]], speed: fast}\n", "mine.yaml, field people "
          "1 speed: it must be a valid number, unable to parse string as a number, not 'fast': "
          "correct it."),

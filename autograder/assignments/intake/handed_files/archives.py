@@ -27,9 +27,10 @@ MAX_INDEX_BYTES = 1024 * 1024
 
 _ENDS = 22, b"PK\x05\x06"
 _MAX_COMMENT_BYTES = 65535
-_UTF8_FLAG, _ENCRYPTED_FLAG = 0x800, 0x1
-_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-_DAMAGE = (zipfile.BadZipFile, zlib.error, OSError, EOFError, NotImplementedError, RuntimeError,
+_UTF8_FLAG, ENCRYPTED_FLAG = 0x800, 0x1
+METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+"""Ways of packing that are read."""
+DAMAGE = (zipfile.BadZipFile, zlib.error, OSError, EOFError, NotImplementedError, RuntimeError,
            ValueError, struct.error)  # fmt: skip
 """What `zipfile` raises for archives that are damaged or use what it does not know."""
 
@@ -52,9 +53,9 @@ class Archive:
             ArchiveError: it is damaged, encrypted, or packed in a way that is not read.
         """
         entry = self.members[name]
-        if entry.flag_bits & _ENCRYPTED_FLAG:
+        if entry.flag_bits & ENCRYPTED_FLAG:
             raise ArchiveError("it is encrypted")
-        if entry.compress_type not in _METHODS:
+        if entry.compress_type not in METHODS:
             raise ArchiveError("it is packed in a way that is not read")
         try:
             with (
@@ -62,7 +63,7 @@ class Archive:
                 archive.open(entry) as member,
             ):
                 return member.read(most)
-        except _DAMAGE as error:
+        except DAMAGE as error:
             raise ArchiveError(f"it is damaged ({str(error)[:100]})") from None
 
 
@@ -82,11 +83,13 @@ def look_into(path: Path) -> Archive:
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             entries = archive.infolist()
-    except _DAMAGE as error:
+    except DAMAGE as error:
         raise ArchiveError(f"it is damaged ({str(error)[:100]})") from None
     if len(entries) > MAX_MEMBERS:
         raise ArchiveError(f"it has more than {MAX_MEMBERS} members")
-    return Archive(content, {_member_name(entry): entry for entry in entries if _is_file(entry)})
+    return Archive(
+        content, {member_name(entry): entry for entry in entries if is_plain_file(entry)}
+    )
 
 
 def _check_index(content: bytes) -> None:
@@ -101,12 +104,13 @@ def _check_index(content: bytes) -> None:
         raise ArchiveError(f"it has more than {MAX_MEMBERS} members")
 
 
-def _is_file(entry: zipfile.ZipInfo) -> bool:
+def is_plain_file(entry: zipfile.ZipInfo) -> bool:
+    """Whether a member is a plain file: no folder, no link, no device."""
     mode = entry.external_attr >> 16
     return stat.S_IFMT(mode) in (0, stat.S_IFREG) and not entry.is_dir()
 
 
-def _member_name(entry: zipfile.ZipInfo) -> str:
+def member_name(entry: zipfile.ZipInfo) -> str:
     """Return a member's name; many programs write UTF-8 without saying so (`zipfile`: CP437)."""
     if entry.flag_bits & _UTF8_FLAG:
         return entry.filename

@@ -17,7 +17,7 @@ class RobotInterface(Robot):
         described = ParameterDescriptor(floating_point_range=[limits])
         self.declare_parameter('max_speed', 0.5, described)
 
-        # Durable: whoever joins late is handed the last level at once.
+        # Durable: a node that joins late is handed the last level at once.
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.battery = self.create_publisher(BatteryState, 'robot/battery', latched)
 

@@ -22,7 +22,7 @@ from course.workspace.content import CONFIG, content_root
 from course.workspace.journal.journal_file import FILE, MANIFEST, Journal
 from course.workspace.journal.progress import WELCOME
 from course.workspace.journal.student_notebooks import read_notebook
-from course.workspace.journal.time_needed import format_minutes
+from course.workspace.journal.time_needed import find_minutes, format_minutes
 from quizzes.bank import selection
 from quizzes.bank.loader import load_bank
 from quizzes.notebook.quiz import Quiz
@@ -32,6 +32,8 @@ QUIZ = Path("ch05-quiz")
 
 
 EXERCISES = list(listing.of_course(content_root())["ch05"].exercises)
+NAMES = ("architecture", "error-handling", "patterns", "qos-design", "resources")
+HANDED_OUT = [CHAPTER, QUIZ / "quiz.ipynb", *(Path(f"ch05/{name}.ipynb") for name in NAMES)]
 
 
 @pytest.fixture(scope="session")
@@ -165,14 +167,31 @@ def test_a_check_before_the_work_has_run_takes_nothing_away(folder: Path) -> Non
 def test_it_says_how_long_a_part_takes_and_how_to_hand_in(folder: Path) -> None:
     progress = course.progress()
     (chapter,) = progress.chapters
-    assert 30 <= chapter.notebook.minutes <= 180
-    assert all(20 <= exercise.notebook.minutes <= 240 for exercise in progress.exercises)
-    assert progress.quizzes[0].notebook.minutes in (10, 20)
+    assert chapter.notebook.minutes == 180
+    assert [e.notebook.minutes for e in progress.exercises] == [45, 60, 90, 90, 150]
+    assert progress.quizzes[0].notebook.minutes == 10
     text = repr(progress)
     assert text.count("  Takes about: ") == 2 + len(EXERCISES)
     assert "give your instructor all files of ch05 and ch05-quiz, each folder as it is" in text
     assert "**To hand in:** save your notebooks" in progress._repr_markdown_()
     assert [format_minutes(minutes) for minutes in (10, 60, 70)] == ["10 min", "1 h", "1 h 10 min"]
+
+
+@pytest.mark.parametrize("path", HANDED_OUT, ids=str)
+def test_each_notebook_says_once_how_long_it_takes(folder: Path, path: Path) -> None:
+    """So the progress page has no other number than the text."""
+    cells = json.loads((folder / path).read_text(encoding="utf-8"))["cells"]
+    texts = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "markdown"]
+    said = [minutes for text in texts if (minutes := find_minutes(text)) is not None]
+    assert said == [find_minutes(texts[0])] == [read_notebook(folder, path).minutes]
+
+
+def test_a_notebook_that_does_not_say_how_long_it_takes_is_guessed(folder: Path) -> None:
+    def forget(cell: dict[str, Any]) -> None:
+        cell["source"] = "".join(cell["source"]).replace("takes about", "takes")
+
+    edit(folder / EXERCISE, forget)
+    assert 20 <= read_notebook(folder, EXERCISE).minutes <= 240
 
 
 def test_next_leads_through_everything_and_ends(folder: Path) -> None:

@@ -1,0 +1,1 @@
+"""What the world's robot offers to nodes: its topics, its gripper, its line, its navigator."""
