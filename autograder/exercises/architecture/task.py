@@ -36,11 +36,18 @@
 # %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-try-it", "locked": true, "schema_version": 3, "solution": false}
 # ## Try it
 #
-# Once the cells below have run, you can see your design at work.
+# Once the cells below have run, in cells of your own:
 #
-# **Look inside**, in cells of your own after `import course`: `design.run()` brings its nodes up, as
-# the examiner does; `course.session().graph()` draws them from the ROS graph, with what is not
-# connected in red; and `course.session().diagnose()` says in words what is wrong.
+# ```python
+# world = course.world("warehouse")
+# world.add_obstacle(6.4, 1.3, 0.25)
+# world
+# ```
+# ```python
+# design.drive(world, to="dock")   # it says what your nodes cannot do
+# ```
+#
+# `course.session().graph()` draws the nodes, and `course.session().diagnose()` finds faults.
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-fine-print", "locked": true, "schema_version": 3, "solution": false}
 # <details><summary>What exactly is examined</summary>
@@ -191,7 +198,7 @@ except InterfaceError:  # no compiler here: an installed action stands in
 #
 # `qos` is a `QoSProfile` or a depth, and can be left out (reliable, volatile, the last 10).
 # `print(design)` lists the design and what is worth another look; `design.run()` brings it up in this
-# notebook. If you prefer plain data, see `help(course.Design.from_data)`, and if you would rather
+# notebook as the examiner does: its nodes only pass marks on. `design.drive(...)` lets them work. If you prefer plain data, see `help(course.Design.from_data)`, and if you would rather
 # write a node yourself, `help(course.Design.node)`.
 #
 # ## Your design
