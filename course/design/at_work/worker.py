@@ -8,6 +8,7 @@ from typing import Any
 
 from course.design.at_work.driving import sensing, steering
 from course.design.at_work.driving.floor_grid import FloorGrid
+from course.design.at_work.driving.memory import ObstacleMemory
 from course.design.at_work.driving.steering import STAND, Command
 from course.design.at_work.meanings import AHEAD, SENSED, Meaning, NodePart
 from course.design.at_work.places.place import BASE, MAP, Place, on_floor, seen_from
@@ -43,6 +44,8 @@ class Worker:
         self._grid = FloorGrid.from_floor(dict(floor)) if has_plan else None
         self._pose, self._pose_time = start, -PATIENCE_S
         self._seen: dict[str, tuple[float, Way]] = {}
+        self._memory = ObstacleMemory()
+        self._detour: list[Place] = []  # on the floor
         self._heard: dict[Meaning, float] = {}
 
     # What it hears.
@@ -59,8 +62,13 @@ class Worker:
         self.hear_pose(moved._replace(yaw=self._pose.yaw + turn * passed), now)
 
     def hear_obstacles(self, source: str, found: Way, now: float) -> None:
-        """Take what one source has found; what it found before is no longer true."""
+        """Take what one source has found."""
         self._seen[source] = (now, found)
+        if (pose := self.pose(now)) is not None:
+            places = [place for place in found[0] if not place.far_only]
+            if found[1] == BASE:
+                places = [on_floor(pose, place) for place in places]
+            self._memory.remember(places, now)
 
     def hear_way(self, meaning: Meaning, way: Way, now: float) -> None:
         """Take a waypoint or a path."""
@@ -81,6 +89,7 @@ class Worker:
     def forget_way(self) -> None:
         """Have nowhere to go any more."""
         self.goal = self.path = None
+        self._detour = []
 
     # What it makes of it.
 
@@ -108,6 +117,13 @@ class Worker:
             for found, frame in fresh
             for place in found
         ]
+
+    def in_the_way(self, now: float) -> list[Place] | None:
+        """Return what `obstacles` does, and what is remembered where it is not seen any more."""
+        seen, pose = self.obstacles(now), self.pose(now)
+        if seen is None or pose is None:
+            return seen
+        return seen + [seen_from(pose, place) for place in self._memory.recall(now)]
 
     def way(self, now: float) -> list[Place] | None:
         """Return the way to drive, as seen from the robot; None if it has none."""
@@ -156,16 +172,22 @@ class Worker:
 
     def command(self, now: float) -> Command:
         """Return how to drive on along the way; to stand if it cannot tell."""
-        way, seen = self.way(now), self.obstacles(now)
+        way, seen = self.way(now), self.in_the_way(now)
         if not way or (seen is None and self.needs_obstacles):
             return STAND
         if math.hypot(way[-1].x, way[-1].y) < ARRIVED_M:
             return STAND
-        return steering.steer(way, seen or ())
+        pose = self.pose(now)
+        if pose is None:
+            return steering.steer(way, seen or ())[0]
+        last = [seen_from(pose, place) for place in self._detour]
+        command, detour = steering.steer(way, seen or (), last)
+        self._detour = [on_floor(pose, place) for place in detour]
+        return command
 
     def guard(self, asked: Command, now: float) -> Command:
         """Return a velocity that it was told, changed as far as it hears of obstacles."""
-        seen = self.obstacles(now)
+        seen = self.in_the_way(now)
         if seen is None:
             return STAND if self.needs_obstacles else asked
         return steering.guard(asked, seen)

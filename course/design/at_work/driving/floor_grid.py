@@ -18,11 +18,11 @@ from course.worlds.floor_plan import ROBOT_RADIUS_M
 CELL_M = 0.1
 """Metres that a cell is wide."""
 
-MARGINS_M = (0.17, 0.05)
-"""Metres that a way keeps from what is on the map: the first that there is a way with."""
+MARGIN_M = 0.05
+"""Metres that a way keeps from everything."""
 
-ROOMY_M, NARROW_COST = 0.45, 3
-"""Metres of room to either side that a way had better have; a metre with less counts so much."""
+ROOM_COSTS = ((0.45, 3), (0.17, 8))
+"""Metres of room to either side that a way had better have, and what a metre with less counts."""
 
 _STEP_M = 0.2  # between two places of a way
 _OCCUPIED = 50
@@ -95,14 +95,13 @@ class FloorGrid:
         grid = FloorGrid(self.taken.copy(), self.cell_m, self.x, self.y)
         for place in obstacles:
             grid.take(place.x, place.y)
-        narrow = _widen(grid.taken, (ROBOT_RADIUS_M + ROOMY_M) / self.cell_m)
-        for margin in MARGINS_M:
-            shut = _widen(grid.taken, (ROBOT_RADIUS_M + margin) / self.cell_m)
-            costs = np.where(shut, 0, np.where(narrow, NARROW_COST, 1))
-            begin, end = grid.cell_of(start.x, start.y), grid.cell_of(goal.x, goal.y)
-            if cells := _search(costs, _free_near(shut, begin), _free_near(shut, end)):
-                corners = [grid._middle(cell) for cell in _straighten(costs, cells)]
-                return _spread([start, *corners[1:-1], goal])
+        costs = np.ones(grid.taken.shape, np.int_)
+        for room, cost in (*ROOM_COSTS, (MARGIN_M, 0)):
+            costs[_widen(grid.taken, (ROBOT_RADIUS_M + room) / self.cell_m)] = cost
+        begin, end = grid.cell_of(start.x, start.y), grid.cell_of(goal.x, goal.y)
+        if cells := _search(costs, _free_near(costs, begin), _free_near(costs, end)):
+            corners = [grid._middle(cell) for cell in _straighten(costs, cells)]
+            return _spread([start, *corners[1:-1], goal])
         return []
 
     def _middle(self, cell: Cell) -> Place:
@@ -121,11 +120,11 @@ def _widen(taken: Cells, radius: float) -> Cells:
     return shut
 
 
-def _free_near(shut: Cells, cell: Cell) -> Cell:
+def _free_near(costs: Costs, cell: Cell) -> Cell:
     """Return the free cell that is nearest: a robot may stand closer to things than it would go."""
-    if not shut[cell]:
+    if costs[cell]:
         return cell
-    rows, columns = np.nonzero(~shut)
+    rows, columns = np.nonzero(costs)
     if not len(rows):
         return cell
     nearest = int(np.hypot(rows - cell[0], columns - cell[1]).argmin())
@@ -175,14 +174,13 @@ def _straighten(costs: Costs, cells: list[Cell]) -> list[Cell]:
 
 
 def _is_as_good(costs: Costs, cells: list[Cell]) -> bool:
-    """Return whether a straight line is no worse than a way: not shut, and not longer narrow."""
+    """Return whether a straight line is no worse than a way: not shut, and it costs no more."""
     (row, column), (last_row, last_column) = cells[0], cells[-1]
     steps = 2 * max(abs(row - last_row), abs(column - last_column)) + 1
     rows = np.rint(np.linspace(row, last_row, steps)).astype(np.intp)
     columns = np.rint(np.linspace(column, last_column, steps)).astype(np.intp)
     line = costs[rows, columns]
-    narrow = sum(costs[cell] > 1 for cell in cells)
-    return bool(line.min() > 0 and (line > 1).sum() <= 2 * narrow)
+    return bool(line.min() > 0 and line.sum() <= 2 * sum(costs[cell] for cell in cells))
 
 
 def _spread(corners: list[Place]) -> list[Place]:

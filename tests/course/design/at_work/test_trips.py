@@ -12,7 +12,7 @@ from nav_msgs.msg import OccupancyGrid, Odometry
 from nav_msgs.srv import GetPlan
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
-from sensor_msgs.msg import LaserScan, PointCloud2
+from sensor_msgs.msg import Image, LaserScan, PointCloud2
 from std_msgs.msg import Float32, String
 from test_msgs.action import NestedMessage
 
@@ -33,7 +33,11 @@ def lab() -> Iterator[Session]:
 
 
 def declare(**changes: Any) -> Design:
-    """Return a right design; a change is the type of ``obstacles``, or what it is ``without``."""
+    """Return a right design.
+
+    A change is the type of ``obstacles``, the type that it ``sees``, or what it is ``without``.
+    """
+    sees = changes.get("sees", LaserScan)
     kind, without = changes.get("obstacles", PoseArray), changes.get("without", ())
     design = Design(outside=["motors/command", "navigate_to"])
     if "lidar" not in without:
@@ -41,8 +45,11 @@ def declare(**changes: Any) -> Design:
     design.node("wheels").publishes("wheel/odometry", Odometry)
     design.node("maps").publishes("map", OccupancyGrid)
     design.node("estimation").subscribes("wheel/odometry", Odometry).publishes("pose", PoseStamped)
-    detection = design.node("detection").subscribes("scan", LaserScan, qos_profile_sensor_data)
-    detection.publishes("obstacles", kind)
+    if sees is Image:
+        design.node("camera").publishes("camera/image", Image)
+    detection = design.node("detection").publishes("obstacles", kind)
+    topic = "scan" if sees is LaserScan else "camera/image"
+    detection.subscribes(topic, sees, qos_profile_sensor_data)
     design.node("planner").subscribes("map", OccupancyGrid).serves("plan", GetPlan)
     navigation = design.node("navigation").action_server("navigate_to", NestedMessage)
     navigation.publishes("velocity", Twist)
@@ -58,10 +65,12 @@ def declare(**changes: Any) -> Design:
     return design
 
 
-def drive(session: Session, design: Design, seconds: float = LONGEST_S) -> Any:
+def drive(
+    session: Session, design: Design, seconds: float = LONGEST_S, obstacle: Any = OBSTACLE
+) -> Any:
     """Drive to the dock around the obstacle; return the trip and where the robot ended."""
     world = session.world("warehouse")
-    world.add_obstacle(*OBSTACLE)
+    world.add_obstacle(*obstacle)
     trip = design.drive(world, to="dock")
     simulation = world.simulation
     while simulation.time_s < seconds and not trip.arrived:
@@ -88,6 +97,18 @@ def test_obstacles_come_in_messages_of_many_types(lab: Session, kind: Any) -> No
     trip, _ = drive(lab, declare(obstacles=kind))
     assert trip.arrived, trip
     assert trip.touched == []
+
+
+@pytest.mark.parametrize("sees", [LaserScan, Image], ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("obstacle", [(6.5, 1.1, 0.3), (6.5, 1.0, 0.3), (7.5, 1.1, 0.3)])
+def test_it_drives_through_one_of_two_gaps_and_touches_nothing(
+    lab: Session, sees: Any, obstacle: Any
+) -> None:
+    trip, _ = drive(lab, declare(sees=sees), obstacle=obstacle)
+    assert trip.arrived, trip
+    assert trip.touched == []
+    took_s = float(str(trip).split(" after ")[1].split(" s.")[0])
+    assert took_s < (26.0 if sees is LaserScan else 36.0)  # 22 s if nothing stands there
 
 
 def test_the_same_design_drives_the_same_way_again() -> None:
