@@ -15,35 +15,30 @@
 #
 # ![A robot drives to a waypoint around a shelf; above it six jobs are joined by arrows, from the sensors to the motors.](architecture.svg)
 #
-# The delivery robot gets a waypoint and drives there, around whatever stands in its way. **You**
-# decide which nodes it has and what connects them: topic, service or action. You declare the design,
-# and the course brings it up as real ROS 2 nodes. This takes about 60 minutes.
+# **You** declare the nodes that drive the robot to a waypoint, around obstacles. This takes about 60
+# minutes.
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-must-do", "locked": true, "schema_version": 3, "solution": false}
 # ## What it must do
 #
 # - **Drivers** publish `scan`, `camera/image` and `wheel/odometry`.
 # - **State estimation** reads a sensor and publishes the robot's pose.
-# - **Obstacle detection** reads `scan` or `camera/image` and publishes what is in the way. That
-#   reaches the motors as a stream: nobody has to ask for it.
+# - **Obstacle detection** reads `scan` or `camera/image`, and publishes what is in the way. That gets
+#   to the motors unasked.
 # - **Path planning** is a service. Its node knows the `map`, and a node that has the goal calls it.
 # - **Navigation** is the server of the action `navigate_to`, and topics tell it what the sensors see.
 # - **Control**: exactly one node publishes `motors/command`, and navigation leads to it.
 #
-# A node does at most **two** of these six jobs; further nodes are welcome. And nothing dangles: each
-# topic has a writer and a reader, each service and action a server, and QoS fits.
+# A node does at most **two** of these jobs; further nodes are welcome. Nothing dangles: each topic
+# has a writer and a reader, each service and action a server, and QoS fits.
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-try-it", "locked": true, "schema_version": 3, "solution": false}
 # ## Try it
 #
-# Once the cells below have run, in cells of your own:
+# Once the cells below have run, in a cell of your own:
 #
 # ```python
-# world = course.world("warehouse")
-# world.add_obstacle(6.4, 1.3, 0.25)
-# world
-# ```
-# ```python
+# world = course.world("warehouse"); world.add_obstacle(6.4, 1.3, 0.25); display(world)
 # design.drive(world, to="dock")   # it says what your nodes cannot do
 # ```
 #
