@@ -13,6 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
+from autograder.processes.outside.holding import DDS_THREADS
 from autograder.processes.process_folders import Processes
 
 MOST_NAMES = 20
@@ -58,14 +59,17 @@ def thread_ids(process: str) -> list[int]:
 def count_naps(processes: Processes, threads: Iterable[int]) -> dict[int, int]:
     """Return how often each of these threads, if it is there, has gone to sleep of itself.
 
-    So which of them works: one that waits for ever goes to sleep just once.
+    So which of them works: one that waits for ever goes to sleep just once. Those of DDS are left
+    out, as they wake up for what others announce, whatever the program does.
     """
     found, folders = {}, processes.list_folders()
     for thread in threads:
         for folder in folders:
             with suppress(OSError, IndexError):
                 status = Path(folder, "task", str(thread), "status").read_bytes()
-                found[thread] = int(status.partition(b"\nvoluntary_ctxt_switches:")[2].split()[0])
+                if not status.startswith(b"Name:\t" + DDS_THREADS):
+                    count = status.partition(b"\nvoluntary_ctxt_switches:")[2]
+                    found[thread] = int(count.split()[0])
     return found
 
 
