@@ -53,7 +53,6 @@ def node_starts(robot: Robot) -> str:
     """
     robot.start()
     await_patterns(robot)
-    robot.note_standstill()
     found = robot.found.offers
     kinds = [f"{name}: {' and '.join(found[name]) or 'nothing'}" for name in SCENARIOS]
     return f"Seen on the ROS graph: {'; '.join(kinds)}."

@@ -23,7 +23,7 @@ FILM_S = 1.2
 """Seconds of the node's clock in which pictures are counted where a short time is enough."""
 POSITION_AGE_S, LEVEL_AGE_S = 0.5, 1.0
 """Seconds of the node's clock that a position, and a battery level, may be old."""
-CLOSE_M, LEVEL_MARGIN = 0.011, 1e-3
+CLOSE_M, LEVEL_MARGIN = 0.051, 1e-3
 ODOMETRY = Topic(SCENARIOS["position"].topic, Float64, value=lambda message: message.data)
 NUMBER = r"-?\d+(?:\.\d+)?(?:[eE][-+]?\d{1,2})?"
 MAX_NUMBERS = 12

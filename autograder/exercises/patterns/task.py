@@ -81,7 +81,7 @@
 # **Position** (2 points)
 #
 # - The hardware says three times where the robot is, within the first metre, once each. Within 0.5 s
-#   a node that asks, or has listened, knows each to within 1 cm. So does one that begins to listen
+#   a node that asks, or has listened, knows each to within 5 cm. So does one that begins to listen
 #   after the last, while the robot stands.
 # - An answer has `success=True` and the number in its `message`, alone or among words: of up to 12
 #   numbers in the first 1000 characters one is right.

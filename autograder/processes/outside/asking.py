@@ -45,7 +45,7 @@ class Here:
     """Answers in this process, about another one: the kernel of a student's own."""
 
     own_network = False
-    usual_patience = 0.5  # in a notebook a second look costs a student nothing, and waiting does
+    usual_patience = 0.15  # in a notebook a second look costs a student nothing, and waiting does
     patience = 1.0
 
     def __init__(self, pid: int) -> None:
