@@ -38,7 +38,7 @@ A node that takes its time for each answer, and yet gives it, would keep the exa
 than it may take (`autograder.running.start.EXAM_TIMEOUT_S`), and that would be the grader's fault.
 """
 
-LEFT_PATIENCE = 0.125
+LEFT_PATIENCE = 0.5
 """Share of the usual patience that a check has where one has failed on which it builds: it will
 hardly pass, and a stub has many of them."""
 
