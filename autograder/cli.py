@@ -386,9 +386,11 @@ def mutate(
             f"{len(done.equivalent)} are known to change nothing."
         )
         for mutation in done.survivors:
-            out.print(f"  {mutation}\n    key: {mutation.key!r}", soft_wrap=True)
+            key = json.dumps(mutation.key, ensure_ascii=False)  # as TOML has it, too
+            out.print(f"  {mutation}\n    key: {key}", soft_wrap=True)
         for key in done.stale:
-            out.print(f"  There is no such mutation any more: {key!r}", soft_wrap=True)
+            key = json.dumps(key, ensure_ascii=False)
+            out.print(f"  There is no such mutation any more: {key}", soft_wrap=True)
     if done.survivors or done.stale:
         raise typer.Exit(EXIT_DIFFERENT)
 

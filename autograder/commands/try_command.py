@@ -14,7 +14,7 @@ from nbformat import NotebookNode
 from autograder import exercises
 from autograder.assignments import submission
 from autograder.corpus import command, trials
-from autograder.corpus.case import Case, CorpusError, Splice, solution_cell
+from autograder.corpus.case import Case, CorpusError, make_exemplar
 from autograder.examination.pictures.wording import describe_picture
 from autograder.examination.verdict import CheckResult
 from autograder.running import runner
@@ -46,7 +46,13 @@ class Tried:
             for check in verdict.checks:
                 yield from _check_lines(check)
         if self.difference:
-            yield f"  not as the corpus says: {self.difference}"
+            yield f"  not as it must be: {self.difference}"
+
+
+def _grader_errors(outcome: Outcome) -> str:
+    checks = [check for verdict in outcome.verdicts.values() for check in verdict.checks]
+    failed = [check.name for check in checks if check.status == "grader_error"]
+    return f"the exam itself failed in {', '.join(failed)}" if failed else ""
 
 
 def _check_lines(check: CheckResult) -> Iterator[str]:
@@ -86,13 +92,12 @@ def try_exam(
         (case,) = command.choose_cases(command.load_cases(exam), [what])[exam]
         handed_in = case.make_submission(source, released)
     else:
-        splices: dict[str, tuple[Splice, ...]] = {solution_cell(exam): ()}
-        exemplar = Case(exam, "exemplar", "The exemplar", frozenset(), splices=splices)
-        handed_in = exemplar.make_submission(source, released)
+        case = make_exemplar(exam)
+        handed_in = case.make_submission(source, released)
     notebook, _ = submission.restore_cells(handed_in, source, released)
     program = submission.extract_program(notebook)
     outcome = runner.run(program, trust=command.needs_trust(say), seed=0)
-    difference = case.verdict_of(outcome) if case else ""
+    difference = case.verdict_of(outcome) if case else _grader_errors(outcome)
     return Tried(what or f"the exemplar of {exam}", outcome, difference)
 
 

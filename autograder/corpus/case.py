@@ -35,6 +35,12 @@ def solution_cell(exam: str) -> str:
     return f"{exam}-solution"
 
 
+def make_exemplar(exam: str) -> Case:
+    """Return the case that is an exercise's exemplar, as its author wrote it."""
+    splices: dict[str, tuple[Splice, ...]] = {solution_cell(exam): ()}
+    return Case(exam, "exemplar", "The exemplar", frozenset(), splices=splices)
+
+
 class CorpusError(CourseError):
     """A case of the corpus that is not well formed, or a corpus that is not there."""
 

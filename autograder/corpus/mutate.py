@@ -11,7 +11,7 @@ from autograder import exercises
 from autograder.assignments import submission
 from autograder.assignments.cells import without_markers
 from autograder.corpus import trials
-from autograder.corpus.case import Case
+from autograder.corpus.case import Case, CorpusError, make_exemplar
 from autograder.corpus.command import needs_trust
 from autograder.corpus.corpus_files import equivalent_mutations
 from autograder.corpus.mutations import Mutation, find_mutations
@@ -47,37 +47,51 @@ def mutate(exam: str, *, jobs: int = 2, say: Callable[[str], None] = lambda _lin
 
     Raises:
         ExamError: an unknown exercise.
-        CorpusError: its list of equivalent mutations is not well formed.
+        CorpusError: its list of equivalent mutations is not well formed, or the exemplar itself
+            does not pass, so that mutations of it show nothing.
     """
     source, released = trials.make_notebooks(exercises.load_exam(exam).name)
+    trust = needs_trust(say)
+    [exemplar] = trials.run([make_exemplar(exam)], source, released, trust=trust)
+    if exemplar.difference:
+        raise CorpusError(
+            f"The exemplar of {exam} does not pass its exam ({exemplar.difference}): see "
+            f"`autograder try {exam}`, and mend the one or the other first."
+        )
     reasons = equivalent_mutations(exam)
     found = [
-        (grade_id, exemplar, mutation)
-        for grade_id, exemplar in _solutions(source)
-        for mutation in find_mutations(exemplar)
+        (grade_id, solution, mutation)
+        for grade_id, solution in _solutions(source)
+        for mutation in find_mutations(solution)
     ]
     keys = {mutation.key for _, _, mutation in found}
     result = Mutated(stale=sorted(reasons.keys() - keys))
     result.equivalent.update({m: reasons[m.key] for _, _, m in found if m.key in reasons})
     of_case: dict[str, Mutation] = {}
     cases: list[Case] = []
-    for number, (grade_id, exemplar, mutation) in enumerate(found):
+    spoilt: dict[Mutation, str] = {}
+    for number, (grade_id, solution, mutation) in enumerate(found):
         if mutation not in result.equivalent:
             name = f"mutation-{number}"
             of_case[name] = mutation
-            splices = {grade_id: ((exemplar, mutation.text),)}
+            splices = {grade_id: ((solution, mutation.text),)}
             cases.append(Case(exam, name, str(mutation), frozenset(), splices=splices))
 
     def note(trial: trials.CorpusTrial) -> None:
         mutation = of_case[trial.case.name]
-        failed = [check for check, status in trial.check_statuses.items() if status in _CAUGHT]
+        statuses = trial.check_statuses
+        failed = [check for check, status in statuses.items() if status in _CAUGHT]
+        if "grader_error" in statuses.values():
+            spoilt[mutation] = trial.difference
         if failed:
             result.caught[mutation] = failed
         else:
             result.survivors.append(mutation)
         say(f"{'caught' if failed else 'SURVIVES'}  {mutation}")
 
-    trials.run(cases, source, released, jobs=jobs, trust=needs_trust(say), done=note)
+    trials.run(cases, source, released, jobs=jobs, trust=trust, done=note)
+    for mutation, difference in spoilt.items():
+        raise CorpusError(f"The exam of {exam} itself fails: {difference}. It did on: {mutation}")
     places = [mutation for _, _, mutation in found]
     result.survivors.sort(key=places.index)
     return result

@@ -76,9 +76,11 @@ def where_to_read(name: str) -> dict[str, str]:
 def require_exercise(name: str) -> None:
     """Raise ExamError if there is no exercise called ``name``; it names the ones there are."""
     if name not in exercise_names():
+        nowhere = exercise_folders.current_exercises().root is None
+        own = " No folder exercises/ of a course's own is here." if nowhere else ""
         raise ExamError(
             f"There is no exam '{name}': there are {', '.join(exercise_names())}."
-            f"{did_you_mean(name, exercise_names())}"
+            f"{did_you_mean(name, exercise_names())}{own}"
         )
 
 

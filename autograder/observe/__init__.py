@@ -9,6 +9,7 @@ What only some exams need, they import from its own module, such as
 exams alone. `python -m autograder.observe` prints all of it.
 """
 
+from autograder.examination.draws import Draws as Draws
 from autograder.observe.nouns import Action as Action
 from autograder.observe.nouns import Parameter as Parameter
 from autograder.observe.nouns import Service as Service

@@ -49,7 +49,7 @@ from autograder.observe.stepped_time.stream_rate import StreamRate, require_stre
 DESCRIBED: dict[str, tuple[Any, ...]] = {
     "One node": (
         observe.one_node, observe.Topic, observe.Service, observe.Action, observe.Parameter,
-        observe.ObservedNode, observe.Span, observe.Change,
+        observe.ObservedNode, observe.Span, observe.Change, observe.Draws,
     ),
     "Several nodes, one at a time, and the servers that they call": (
         several_nodes, Nodes, observe.Task, ClockBoundNode, ServiceServer, Request,

@@ -88,7 +88,7 @@ class ObservedNode:
     """One of the student's nodes at work: looks at it, asks it, and moves its time.
 
     Attributes:
-        draws: the numbers of this examination, which nobody can know beforehand.
+        draws: `Draws`, the numbers of this examination, which nobody can know beforehand.
         end: the examiner's end of its topics, services and actions.
     """
 
@@ -491,6 +491,7 @@ class ObservedNode:
 
     def send(self, topic: Topic, message: Any) -> None:
         """Publish a message on a topic that the node listens to, and let it deal with it."""
+        self._bench.note_step(f"sent on {topic}: {_abridged([topic.value(message)])}")
         self.end.publisher(topic).publish(message)
         self.rest()
 
@@ -499,11 +500,16 @@ class ObservedNode:
     def destroy(self) -> None:
         """Call the node's ``destroy_node``, as a program does that goes on without it.
 
+        What came before does not count to the span that follows.
+
         Raises:
             StudentError: it raised.
         """
         self._bench.subject.stop(self._task.node, bare=True)
         self._bench.subject.collect()
+        self.rest()
+        for topic in self._task.publishes:
+            self._looked_at[topic.name] = len(self.end.heard(topic))
         self._bench.note_step("destroy_node() was called")
 
     def require_gone(self) -> None:

@@ -186,21 +186,25 @@ class Span:
                 + self._note(),
             )
 
-    def require_values(self, topic: Topic, values: Sequence[Any], *, ordered: bool = True) -> None:
+    def require_values(
+        self, topic: Topic, values: Sequence[Any], *, ordered: bool = True, tolerance: float = 0.0
+    ) -> None:
         """Require that these values come on a topic, and no others.
 
         Args:
             topic: one that the node publishes on.
             values: as `Topic.value` has them.
             ordered: whether their order matters.
+            tolerance: by how much each may differ, if they are numbers, in their unit.
 
         Raises:
             Failed: others did.
         """
         came = self.values(topic)
-        if came != list(values) and (ordered or not _same_members(came, values)):
+        if not _are_alike(came, values, ordered, tolerance):
+            within = f", to within {tolerance:g}," if tolerance else ""
             raise Failed(
-                expected=self._sentence(f"{list(values)!r:.300} comes on {topic}."),
+                expected=self._sentence(f"{list(values)!r:.300}{within} comes on {topic}."),
                 actual=f"What came was {came!r:.300}." if came else f"Nothing came.{self._note()}",
             )
 
@@ -260,6 +264,17 @@ class Span:
 
 def _came(number: int) -> str:
     return "1 message came" if number == 1 else f"{number or 'no'} messages came"
+
+
+def _are_alike(came: Sequence[Any], wanted: Sequence[Any], ordered: bool, tolerance: float) -> bool:
+    if tolerance:
+        if not ordered:
+            came, wanted = sorted(came), sorted(wanted)
+        pairs = zip(came, wanted, strict=False)
+        return len(came) == len(wanted) and all(
+            abs(value - other) <= tolerance * (1 + 1e-9) for value, other in pairs
+        )
+    return list(came) == list(wanted) or (not ordered and _same_members(came, wanted))
 
 
 def _same_members(some: Sequence[Any], others: Sequence[Any]) -> bool:

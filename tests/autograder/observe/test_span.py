@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from contextlib import nullcontext
+from typing import Any
+
 import pytest
 
 from autograder.examination.exam import Failed
@@ -40,6 +44,27 @@ def test_a_rate_is_a_number_of_messages_that_come_one_by_one(
     times: list[float], fault: str
 ) -> None:
     assert rate_of(times, 5.0, 0.1, hz=1.0, leeway=0.1).fault == fault
+
+
+@pytest.mark.parametrize(
+    ("came", "wanted", "how", "is_right"),
+    [
+        ([1.5, 2.5], [1.5, 2.5], {}, True),
+        ([2.5, 1.5], [1.5, 2.5], {}, False),
+        ([2.5, 1.5], [1.5, 2.5], {"ordered": False}, True),
+        ([15.47], [15.48], {}, False),
+        ([15.47], [15.48], {"tolerance": 0.01}, True),
+        ([15.46], [15.48], {"tolerance": 0.01}, False),
+        ([15.47, 15.47], [15.48], {"tolerance": 0.01}, False),
+        ([1.1, 1.0], [1.1, 1.2], {"tolerance": 0.1, "ordered": False}, True),
+        ([math.nan], [1.0], {"tolerance": 0.1}, False),
+    ],
+)
+def test_values_are_those_that_are_wanted(
+    came: list[float], wanted: list[float], how: dict[str, Any], is_right: bool
+) -> None:
+    with nullcontext() if is_right else pytest.raises(Failed, match="comes on /beats"):
+        span_of(*((1.0, value) for value in came)).require_values(BEATS, wanted, **how)
 
 
 def test_of_a_fast_rate_a_part_may_be_missing() -> None:
