@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,9 +44,13 @@ class Person:
 class People:
     """Some users whose homes lie in a folder."""
 
-    def __init__(self, folder: Path, names: Iterable[str]) -> None:
-        """Give each of ``names`` a home in ``folder``, which everybody may enter."""
+    def __init__(self, folder: Path, names: Iterable[str], tools: Iterable[Path] = ()) -> None:
+        """Give each of ``names`` a home in ``folder``, which everybody may enter.
+
+        The way is open to the folders ``tools``, too.
+        """
         self.folder = folder
+        self._tools = {path.resolve() for path in tools}
         folder.chmod(0o755)
         free = (n for n in range(FIRST_ID, 60_000) if not _is_taken(n))
         self._people = {
@@ -67,9 +72,14 @@ class People:
         for place in (path, *path.rglob("*")):
             os.chown(place, number, number, follow_symlinks=False)
 
-    def start(self, name: str, *command: str, cwd: Path | None = None) -> subprocess.Popen[str]:
-        """Start a command as a user, in their home or in ``cwd``."""
-        person = self[name]
+    def start(
+        self, name: str, *command: str, cwd: Path | None = None, log: Path | None = None
+    ) -> subprocess.Popen[str]:
+        """Start a command as a user, in their home or in ``cwd``.
+
+        ``root`` knows the users, too. With ``log``, what it says goes there.
+        """
+        person = Person("root", 0, self.folder) if name == "root" else self[name]
         env = {
             "HOME": str(person.home),
             "USER": name,
@@ -80,17 +90,20 @@ class People:
         }
         # As root, bubblewrap makes no user namespace: the ids are real ones.
         namespace = ["bwrap", "--die-with-parent", "--dev-bind", "/", "/", "--cap-add", "ALL"]
-        for path in (self._etc / "passwd", self._etc / "group"):
+        for path in sorted(self._etc.iterdir()):
             namespace += ["--ro-bind", str(path), f"/etc/{path.name}"]
         namespace += [*self._opened(), "--chdir", str(cwd or person.home)]
         as_user = [
             "setpriv", f"--reuid={person.number}", f"--regid={person.number}", "--clear-groups",
             "--bounding-set=-all", "--inh-caps=-all",
         ]  # fmt: skip
-        return subprocess.Popen(
-            [*namespace, *as_user, *command], env=env, stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
+        if person.number == 0:
+            as_user = []
+        with log.open("wb") if log else nullcontext(subprocess.PIPE) as said:
+            return subprocess.Popen(
+                [*namespace, *as_user, *command], env=env, stdin=subprocess.DEVNULL,
+                stdout=said, stderr=subprocess.STDOUT if log else said, text=True,
+            )  # fmt: skip
 
     def run(self, name: str, *command: str, cwd: Path | None = None, code: int = 0) -> str:
         """Run a command as a user; return what it printed, and see that it ends with ``code``."""
@@ -99,7 +112,7 @@ class People:
     def _opened(self) -> Iterator[str]:
         """Yield what opens the way to Python, to this project and to the homes."""
         needed = {Path(p).absolute() for p in (sys.prefix, sys.base_prefix, PROJECT)}
-        needed |= {path.resolve() for path in needed}
+        needed |= {path.resolve() for path in needed} | self._tools
         closed = {p: _closed_above(p) for p in sorted(needed | {self.folder})}
         for above in sorted({above for above in closed.values() if above is not None}):
             yield from ("--perms", "0755", "--tmpfs", str(above))
@@ -121,6 +134,18 @@ class People:
             known = Path("/etc", name).read_text(encoding="utf-8").rstrip("\n")
             (etc / name).write_text(f"{known}\n{''.join(lines)}", encoding="utf-8")
         return etc
+
+    def set_passwords(self, password: str) -> None:
+        """Let all of them sign in with a password, as PAM checks it."""
+        # Python 3.13 has no crypt any more; Debian has Perl wherever it has passwords.
+        hashed = subprocess.run(
+            ["perl", "-e", "print crypt($ARGV[0], q($6$tests$))", password],
+            capture_output=True, text=True, check=True, timeout=60,
+        ).stdout  # fmt: skip
+        lines = "".join(f"{name}:{hashed}:20000:0:99999:7:::\n" for name in self._people)
+        shadow = self._etc / "shadow"
+        shadow.touch(mode=0o600)
+        shadow.write_text(f"root:*:20000:0:99999:7:::\n{lines}", encoding="utf-8")
 
 
 def finished(process: subprocess.Popen[str], code: int = 0) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import os
 import re
 import subprocess
@@ -90,6 +91,33 @@ def test_a_wheel_carries_what_the_commands_look_for(project: dict[str, Any]) -> 
     assert included.keys() - {f"notebooks/{name}" for name in own} == {".ci/constraints.txt"}
     for target in included.values():
         assert target.startswith("course/data/")
+
+
+def test_a_plain_jupyter_lab_has_the_settings_of_course_lab(tmp_path: Path) -> None:
+    """They lie in the environment, so that a hub, too, needs nothing but the package."""
+    code = """
+import json
+from jupyterlab_server.config import get_page_config
+from jupyter_core.paths import jupyter_config_path
+from nbgrader.apps import NbGrader
+app = NbGrader()
+app.load_config_file()
+page = get_page_config(jupyter_config_path())
+print(json.dumps([app.config.Execute.timeout, page["disabledExtensions"]]))
+"""
+    none = {name: str(tmp_path) for name in ("JUPYTER_CONFIG_DIR", "JUPYTER_DATA_DIR")}
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, env={**os.environ, **none},
+        capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
+    settings = Path(content.__file__).parent / "jupyter"
+    timeout, disabled = json.loads(done.stdout)
+    assert (
+        timeout == json.loads((settings / "nbgrader_config.json").read_text())["Execute"]["timeout"]
+    )
+    page = json.loads((settings / "labconfig" / "page_config.json").read_text())
+    for name, off in page["disabledExtensions"].items():
+        assert (name in disabled) == off, name
 
 
 def test_the_material_is_found_beside_the_packages_or_in_them(

@@ -1,7 +1,8 @@
-"""``autograder new``: a course, an exercise or a quiz to begin with; each works at once."""
+"""``autograder new``: a course, an exercise, a quiz or a hub to begin with; each works at once."""
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 from typing import Annotated
@@ -10,13 +11,15 @@ import typer
 
 from autograder.assignments import listing
 from autograder.commands.options import Root, course_root
+from autograder.hub import new_hub
+from autograder.hub.hub_settings import COURSE_ID
 from autograder.util import exercise_folders
 from autograder.util.terminal import Terminal
 from course.errors import CourseError
 from course.workspace.content import CONFIG, content_root
 from quizzes.bank.schema import EXAMPLES
 
-app = typer.Typer(help="Begin a course, an exercise or a quiz.", no_args_is_help=True)
+app = typer.Typer(help="Begin a course, an exercise, a quiz or a hub.", no_args_is_help=True)
 out = Terminal()
 
 TEMPLATE = exercise_folders.NEW_EXERCISE
@@ -36,9 +39,15 @@ def course_command(
     chapter: Annotated[
         bool, typer.Option("--chapter-5", help="With the texts of chapter 5 and its exercises.")
     ] = False,
+    course_id: Annotated[
+        str, typer.Option("--course-id", help="Its name in nbgrader's exchange (ros2-course).")
+    ] = "",
+    exchange: Annotated[
+        Path | None, typer.Option("--exchange", help="nbgrader's exchange, as on a hub.")
+    ] = None,
 ) -> None:
     """Make a course root: nbgrader's configuration, and a place for exercises of your own."""
-    made = make_course(folder, with_chapter=chapter)
+    made = make_course(folder, with_chapter=chapter, course_id=course_id, exchange=exchange)
     out.print(f"A course: {made}", soft_wrap=True)
     out.print(f"Go on with: cd {folder} && autograder new exercise NAME --assignment lab1")
 
@@ -65,18 +74,56 @@ def quiz_command(name: str, root: Root = None) -> None:
     out.print(f"Go on with: autograder quiz lint {name}")
 
 
-def make_course(folder: Path, *, with_chapter: bool = False) -> Path:
+@app.command("hub")
+def hub_command(
+    folder: Path,
+    exchange: Annotated[
+        Path, typer.Option("--exchange", help="nbgrader's exchange, which all users share.")
+    ] = new_hub.EXCHANGE,
+    python: Annotated[
+        Path | None,
+        typer.Option("--python", help="The Python that users work with, if not this one."),
+    ] = None,
+) -> None:
+    """Write a JupyterHub configuration: courses, graders, exchange, limits, in one folder."""
+    made = new_hub.make_hub(folder, exchange, python)
+    out.print(f"A hub: {made}", soft_wrap=True)
+    out.print(f"Go on with: {folder / 'README.md'}", soft_wrap=True)
+
+
+def make_course(
+    folder: Path,
+    *,
+    with_chapter: bool = False,
+    course_id: str = "",
+    exchange: Path | None = None,
+) -> Path:
     """Make a course root of a folder that is new or empty; return it.
 
+    Args:
+        folder: where to.
+        with_chapter: with the texts of chapter 5.
+        course_id: its name in nbgrader's exchange, if not the bundled course's.
+        exchange: nbgrader's exchange, if not nbgrader's own default.
+
     Raises:
-        NewError: there is something in it, or it cannot be written.
+        NewError: the id cannot be one, there is something in the folder, or it cannot be written.
     """
+    if course_id and not re.search(COURSE_ID, course_id):
+        raise NewError(
+            f"A course cannot have the id '{course_id}': take small letters, digits and hyphens."
+        )
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise NewError(f"{folder} is not empty: choose a folder that is not there yet.")
         (folder / exercise_folders.FOLDER).mkdir(parents=True)
         (folder / listing.ASSIGNMENTS).mkdir(parents=True)
         shutil.copyfile(content_root() / CONFIG, folder / CONFIG)
+        with (folder / CONFIG).open("a", encoding="utf-8") as config:
+            if course_id:
+                config.write(f"\nc.CourseDirectory.course_id = {course_id!r}\n")
+            if exchange:
+                config.write(f"\nc.Exchange.root = {str(exchange.expanduser().absolute())!r}\n")
         if with_chapter:
             shutil.copytree(content_root() / "authoring", folder / "authoring", dirs_exist_ok=True)
     except OSError as error:

@@ -277,7 +277,7 @@ class Exam(Generic[RigT]):
                 bench.steps.clear()
                 bench.outside.patience = LEFT_PATIENCE if at_fault else 1.0
                 result = _run_check(check, rig, gone)
-                if result.status == "failed" and at_fault:
+                if result.status in ("failed", "not_examined") and at_fault:
                     result = _not_checked(check, not_checked.needed_check(at_fault[0]))
                 done[name] = replace(result, steps=tuple(bench.steps))
         return done[name]

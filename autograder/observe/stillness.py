@@ -18,8 +18,8 @@ class Stillness:
 
     @property
     def patience(self) -> float:
-        """The share of the usual patience that is left for what may never come, from 0 to 1."""
-        return self._outside.patience
+        """The share of grading's patience that is left for what may never come, from 0 to 1."""
+        return self._outside.usual_patience * self._outside.patience
 
     def wait_for_rest(self, restless: float = RESTLESS_S, timeout: float = HANGS_S) -> bool:
         """Return once both are at rest, or prove to be restless; say which it was.

@@ -39,6 +39,12 @@ def lab(
     copy_only: Annotated[
         bool, typer.Option("--copy-only", help="Make the working copy and stop.")
     ] = False,
+    chapters_only: Annotated[
+        bool,
+        typer.Option(
+            "--chapters-only", help="Leave out the exercises: nbgrader's exchange hands them out."
+        ),
+    ] = False,
 ) -> None:
     """Open JupyterLab on a working copy of the chapters and exercises.
 
@@ -50,7 +56,7 @@ def lab(
     # JupyterLab's own options take values, so only the first word can be the folder.
     folder = Path(rest.pop(0)) if rest and not rest[0].startswith("-") else course_lab.DEFAULT
     folder = folder.expanduser().absolute()
-    copied = course_lab.make_copy(folder)
+    copied = course_lab.make_copy(folder, assignments=not chapters_only)
     for name in copied.new:
         _print_text(f"new: {folder / name}")
     for name, beside in copied.beside.items():

@@ -6,79 +6,39 @@ import importlib
 import weakref
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any
 
 from rclpy.exceptions import InvalidNamespaceException, InvalidNodeNameException
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
 from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 
 from course.design import drawing, findings
-from course.design.endpoints import DesignEndpoint, DesignError, Role, make_endpoint, rclpy_reason
+from course.design.endpoints import DesignError, Role, rclpy_reason
 from course.design.node import DesignNode
+from course.design.node_declaration import NodeDeclaration
 from course.runtime.core_session import CoreSession
+
+if TYPE_CHECKING:
+    from course.design.at_work.departure import DrivenWorld
+    from course.design.at_work.trip import Trip
 
 _running: weakref.WeakKeyDictionary[CoreSession, list[Node]] = weakref.WeakKeyDictionary()
 
 
-class NodeDeclaration:
-    """One node of a design. Every method adds an endpoint and returns the node again."""
-
-    def __init__(self, name: str, namespace: str = "", factory: Any = None) -> None:
-        """Declare a node; `Design.node` does it for you."""
-        self.name = name
-        self.namespace = namespace
-        self.factory = factory
-        self.endpoints: list[DesignEndpoint] = []
-
-    @property
-    def label(self) -> str:
-        """The name under which the design knows the node: with its namespace, if it has one."""
-        return f"{self.namespace}/{self.name}".strip("/")
-
-    def publishes(self, topic: str, msg_type: Any, qos: QoSProfile | int | None = None) -> Self:
-        """Publish on a topic; without `qos`, reliable and volatile with depth 10."""
-        return self._add_endpoint(Role.PUBLISHES, topic, msg_type, qos)
-
-    def subscribes(self, topic: str, msg_type: Any, qos: QoSProfile | int | None = None) -> Self:
-        """Subscribe to a topic; without `qos`, reliable and volatile with depth 10."""
-        return self._add_endpoint(Role.SUBSCRIBES, topic, msg_type, qos)
-
-    def serves(self, service: str, srv_type: Any, qos: QoSProfile | None = None) -> Self:
-        """Answer the requests of a service."""
-        return self._add_endpoint(Role.SERVES, service, srv_type, qos)
-
-    def calls(self, service: str, srv_type: Any, qos: QoSProfile | None = None) -> Self:
-        """Call a service."""
-        return self._add_endpoint(Role.CALLS, service, srv_type, qos)
-
-    def action_server(self, action: str, action_type: Any) -> Self:
-        """Carry out the goals of an action."""
-        return self._add_endpoint(Role.ACTION_SERVER, action, action_type)
-
-    def action_client(self, action: str, action_type: Any) -> Self:
-        """Send goals of an action."""
-        return self._add_endpoint(Role.ACTION_CLIENT, action, action_type)
-
-    def _add_endpoint(self, role: Role, name: str, ros_type: Any, qos: Any = None) -> Self:
-        new = make_endpoint(role, self.name, self.namespace, name, ros_type, qos)
-        for old in self.endpoints:
-            if (old.role, old.full_name) == (role, new.full_name):
-                raise DesignError(f"{self.label} {role} {new.full_name} twice: once is enough.")
-        self.endpoints.append(new)
-        return self
-
-    def __repr__(self) -> str:
-        """Return the node and its endpoints as text."""
-        return "\n".join(drawing.node_lines(self))
+def _replace_nodes(host: CoreSession) -> list[Node]:
+    """Stop the nodes of the last run in a session; return the list that keeps those of the next."""
+    if earlier := _running.pop(host, []):
+        host.stop(*earlier)
+    return _running.setdefault(host, [])
 
 
 class Design:
     """The nodes of a robot and what connects them, brought up as real ROS 2 nodes.
 
-    The nodes do no work of their own: each passes tagged messages (see `message_tags`) from
-    everything it reads to everything it writes. In a notebook a design shows itself as a graph.
+    Brought up by `run`, the nodes do no work of their own: each passes tagged messages (see
+    `message_tags`) from everything it reads to everything it writes. Brought up by `drive`, they
+    drive a robot. In a notebook a design shows itself as a graph.
 
     Example::
 
@@ -125,7 +85,7 @@ class Design:
                 for entry in entries:
                     if isinstance(entry, str) or not 2 <= len(entry) <= 3:
                         raise DesignError(f"{name}.{role}: {entry!r} is not [name, type, qos].")
-                    node._add_endpoint(Role(role), *entry)
+                    node.add_endpoint(Role(role), *entry)
         return design
 
     def node(
@@ -204,14 +164,40 @@ class Design:
         host = (
             session or importlib.import_module("course.learner_session.default_session").session()
         )
-        if earlier := _running.pop(host, []):
-            host.stop(*earlier)
-        nodes = _running.setdefault(host, [])
+        nodes = _replace_nodes(host)
         made = {}
         for label, factory in factories.items():
             made[label] = host.run(factory)
             nodes.append(made[label])
         return made
+
+    def drive(self, world: DrivenWorld, to: str | tuple[float, float]) -> Trip:
+        """Bring every node up to do its work, and send the robot of a world to a place.
+
+        The nodes do what their endpoints ask for, and know only what they are told: drivers have
+        the sensors' cables, a node that reads a scan finds what is in the way, one that has the map
+        and is asked plans a path, and ``motors/command`` moves the robot. What is missing in the
+        design is missing on the floor. It returns at once::
+
+            world = course.world("warehouse")
+            design.drive(world, to="dock")
+
+        Args:
+            world: as `course.world` makes one; its robot is the design's from now on.
+            to: the name of a station, or x and y in m.
+
+        Returns:
+            How the trip goes: it shows itself, and says what each node could not do.
+
+        Raises:
+            DesignError: see `node_factories`; or there is no such station.
+            SessionError: the world has ended.
+        """
+        self.node_factories()
+        # Imported by name: examinations, which never drive, need nothing of it.
+        departure = importlib.import_module("course.design.at_work.departure")
+        trip: Trip = departure.start_trip(self, world, to, _replace_nodes)
+        return trip
 
     def __repr__(self) -> str:
         """Return the design as text: nodes, links, and what is worth another look."""

@@ -44,7 +44,7 @@ class Copied:
     beside: dict[Path, Path] = field(default_factory=dict)
 
 
-def make_copy(folder: Path, root: Path | None = None) -> Copied:
+def make_copy(folder: Path, root: Path | None = None, *, assignments: bool = True) -> Copied:
     """Put the chapters and the released assignments into ``folder``.
 
     A file that is there is never changed, but for the progress that the first notebook shows. Where
@@ -54,18 +54,22 @@ def make_copy(folder: Path, root: Path | None = None) -> Copied:
     Args:
         folder: the working copy; it is made if need be.
         root: the nbgrader course root; the course's own if left out.
+        assignments: False leaves their folders to nbgrader's exchange, which fetches no assignment
+            whose folder is there. Once fetched, they count for the student's progress all the same.
 
     Raises:
         WorkingCopyError: ``folder`` cannot be used.
         ContentError: the course's own files are damaged.
     """
-    files = _course_files(root or content_root())
+    files = _course_files(root or content_root(), assignments)
     copied = Copied(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         handed_out = _read_manifest(folder)
         for name, content in files.items():
-            _hand_out(copied, name, content, handed_out.setdefault(str(name), []))
+            digests = handed_out.setdefault(str(name), [])
+            if assignments or len(name.parts) == 1:
+                _hand_out(copied, name, content, digests)
         _write_manifest(folder, handed_out)
         welcome.refresh_progress(folder)
     except OSError as error:
@@ -104,13 +108,19 @@ def _first_view(arguments: Sequence[str]) -> list[str]:
     return [] if chosen or not WELCOME.is_file() else [f"--LabApp.default_url=/lab/tree/{WELCOME}"]
 
 
-def _course_files(root: Path) -> dict[Path, bytes]:
-    """Return {path in a working copy: content}: chapters at its top, assignments in folders."""
+def _course_files(root: Path, assignments: bool) -> dict[Path, bytes]:
+    """Return {path in a working copy: content}: chapters at its top, assignments in folders.
+
+    Without ``assignments`` their contents are not made, which takes the longest.
+    """
     from course.workspace.student_version import student_versions
 
     chapters = sorted((root / "chapters").glob("*.ipynb"))
     files = {Path(path.name): path.read_bytes() for path in chapters}
-    files |= {path: text.encode() for path, text in student_versions(root).items()}
+    if assignments:
+        files |= {path: text.encode() for path, text in student_versions(root).items()}
+    else:
+        files |= {p.relative_to(root / "source"): b"" for p in (root / "source").glob("*/*.ipynb")}
     beside = [(root / "source" / path).with_suffix(".svg") for path in files]
     beside += sorted((root / "source").glob("*/exercises/*/*"))
     files |= {p.relative_to(root / "source"): p.read_bytes() for p in beside if p.is_file()}

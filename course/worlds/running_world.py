@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 from course.errors import SessionError
@@ -135,6 +136,29 @@ class RunningWorld:
         with self._paced.lock:
             self._control()
             self._node.reset()
+
+    # What other nodes have to do with it.
+
+    def hand_over(
+        self, deliver: Callable[[str, Any], None], cables: Collection[str], motors: str
+    ) -> None:
+        """Leave the robot's topics to other nodes; see `WorldNode.hand_over`."""
+        with self._paced.lock:
+            self._control()
+            self._node.hand_over(deliver, cables, motors)
+
+    def show_plans(
+        self, path: Sequence[tuple[float, float]], found: Sequence[tuple[float, float]]
+    ) -> None:
+        """Show a planned path and where somebody has found obstacles, in m."""
+        with self._paced.lock:
+            self._paced.simulation.show_path(path)
+            self._paced.simulation.show_found(found)
+
+    def tell(self, what: str) -> None:
+        """Show a sentence among the news; its end says when."""
+        with self._paced.lock:
+            self._paced.simulation.tell(what)
 
     # Time.
 

@@ -95,11 +95,11 @@ class Simulation:
         )
         self._steps += 1
         if (moved := self.gripper.step(at_station=self._is_at_station())) is not None:
-            self._tell(f"The gripper {'closed' if moved else 'opened'}")
+            self.tell(f"The gripper {'closed' if moved else 'opened'}")
         if robot.touching != touched:
             self._events.append(("bumper", robot.touching))
             if robot.touching:
-                self._tell(f"The robot touched {self.floor.nearest_kind(robot.x, robot.y)}")
+                self.tell(f"The robot touched {self.floor.nearest_kind(robot.x, robot.y)}")
         self._shown.follow(robot.x, robot.y)
         return self._read_sensors()
 
@@ -149,7 +149,7 @@ class Simulation:
         """Limit m/s and rad/s, in both directions, from now on. What is no limit is left alone."""
         if all(math.isfinite(limit) and limit >= 0.0 for limit in (speed, turn)):
             self.robot.limit_speeds(speed, turn)
-            self._tell(f"The speed limits became {speed:g} m/s and {turn:g} rad/s")
+            self.tell(f"The speed limits became {speed:g} m/s and {turn:g} rad/s")
 
     def command_gripper(self, closed: bool) -> bool:
         """Close or open the gripper; return False if it refuses."""
@@ -158,14 +158,14 @@ class Simulation:
     def press_stop(self) -> None:
         """Press the emergency stop: the robot brakes, and takes no commands until the release."""
         if not self.robot.stopped:
-            self._tell("The emergency stop was pressed")
+            self.tell("The emergency stop was pressed")
         self.robot.stopped = True
         self._events.append(("emergency", "pressed"))
 
     def release_stop(self) -> None:
         """Release the emergency stop; the next command moves the robot again."""
         if self.robot.stopped:
-            self._tell("The emergency stop was released")
+            self.tell("The emergency stop was released")
             self.drive(0.0, 0.0)
             self.robot.stopped = False
             self._events.append(("emergency", "released"))
@@ -197,7 +197,7 @@ class Simulation:
             self._events.append(("jammed", self.robot.jammed))
         elif what == "battery":
             self.robot.charge = LOW_CHARGE if state == "low" else 1.0
-        self._tell(f"Now {what}: {state},")
+        self.tell(f"Now {what}: {state},")
 
     def reset(self) -> None:
         """Begin anew: robot, people, noise, faults and time are as at first, obstacles are gone."""
@@ -232,7 +232,8 @@ class Simulation:
             "faults": dict(self.faults),
         }
 
-    def _tell(self, what: str) -> None:
+    def tell(self, what: str) -> None:
+        """Add to the news what has happened now."""
         self._shown.news.append(f"{what} at {self.time_s:.1f} s.")
 
     def _is_near(self, x: float, y: float) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Any
 
 from geometry_msgs.msg import PoseArray, Twist
@@ -18,7 +18,7 @@ from course.worlds import messages
 from course.worlds.interfaces.gripper_service import GripperService
 from course.worlds.interfaces.line_drive import LineDrive
 from course.worlds.interfaces.navigator import Navigator
-from course.worlds.interfaces.ports import Ports
+from course.worlds.interfaces.ports import Deliver, Ports
 from course.worlds.pacing import PacedSimulation
 from course.worlds.robot.base import STEP_S
 from course.worlds.simulation import (
@@ -101,6 +101,19 @@ class WorldNode(Node):
             if self._navigator is not None:
                 self._navigator.reset()
             self.publish_events()
+
+    def hand_over(self, deliver: Deliver, cables: Collection[str], motors: str) -> None:
+        """Leave the robot's topics to other nodes, which have its cables from now on.
+
+        Args:
+            deliver: gets what the world would publish.
+            cables: the topics whose messages are worth making; looked at each time.
+            motors: the topic that its motors hear, instead of ``cmd_vel``.
+        """
+        assert self.executor is not None
+        with self.executor.hold_still(), self._paced.lock:  # type: ignore[attr-defined]
+            self._ports.hand_over(deliver, cables)
+            self._ports.listen(Twist, motors, self._on_command)
 
     def describe_topics(self) -> list[dict[str, Any]]:
         """Return name, type, rate (Hz, 0 for what comes now and then) and last message of each."""

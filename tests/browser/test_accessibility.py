@@ -32,15 +32,23 @@ THEMES = ("JupyterLab Dark", "JupyterLab Light")
 TRACKER = ("@jupyterlab/notebook-extension", "tracker")
 
 
+@pytest.fixture(scope="module")
+def own_lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lab]:
+    """A lab on a working copy that nobody shares: all of its chapter is run here."""
+    folder = tmp_path_factory.mktemp("accessible")
+    with Lab(folder, folder / "mine", by_course=True) as running:
+        yield running
+
+
 @pytest.fixture
-def student(course_lab: Lab, browser: Browser) -> Iterator[NotebookPage]:
+def student(own_lab: Lab, browser: Browser) -> Iterator[NotebookPage]:
     """A student's window on a working copy, in which a notebook is on the page from end to end."""
-    course_lab.settings(*TRACKER, {"windowingMode": "none"})
+    own_lab.settings(*TRACKER, {"windowingMode": "none"})
     context = browser.new_context(viewport={"width": 1280, "height": 900})
-    yield NotebookPage(course_lab, context)
+    yield NotebookPage(own_lab, context)
     context.close()
-    course_lab.end_kernels()
-    course_lab.settings(*TRACKER, {})
+    own_lab.end_kernels()
+    own_lab.settings(*TRACKER, {})
 
 
 def test_what_shuts_people_out_is_found(browser: Browser) -> None:

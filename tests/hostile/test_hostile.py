@@ -8,7 +8,8 @@ Each ``attacks/<name>.py`` is the last cell before the first check, under a head
     # prints: a fragment of what the cell itself must print, an error included
     # exercise: the exercise; qos if left out
     # base: the corpus case that the rest of the submission is; an empty solution if left out
-    # score: the automatic points that it deserves; 0 if left out, "any" if they do not matter
+    # score: the automatic points that it deserves; 0 if left out, "any" if they do not matter,
+    #     "at most 10" where what cannot be examined any more depends on the moment
     # seconds: what a cell of it may take, if not as long as always
     # reaches: "the exam" if it tries nothing but to mislead it; the machine if left out
 
@@ -260,7 +261,9 @@ def test_an_attack_is_contained_and_explained_and_hurts_nobody(
         assert score(beside) == FULL, grade_text(beside)
 
     said, shown = grade_text(outcome), json.dumps(outcome.outputs, ensure_ascii=False)
-    if attack.score != "any":
+    if attack.score.startswith("at most "):
+        assert score(outcome) <= float(attack.score.removeprefix("at most ")), said
+    elif attack.score != "any":
         assert score(outcome) == float(attack.score), said
     for either in attack.told:
         assert any(fragment in said for fragment in either.split(" | ")), said

@@ -21,7 +21,6 @@ BUILT = [
 ]
 SHOWN = {
     "qos-design": ["QoS lab", "/sensor_drivers", "/camera/image"],
-    "architecture": ["ROS graph"],
     "patterns": ["Parameters of /robot_interface"],
     "resources": ["/camera_driver"],
     "error-handling": ["Action /drive, 0 goals"],

@@ -56,7 +56,7 @@ def value_of(run: Run, expression: str) -> Any:
     return ast.literal_eval(run(f"print(repr({expression}))"))
 
 
-@pytest.mark.parametrize("name", ["patterns", "resources", "error-handling"])
+@pytest.mark.parametrize("name", ["architecture", "patterns", "resources", "error-handling"])
 def test_the_first_screen_is_short(name: str) -> None:
     above, _ = "\n".join(
         cell.source for cell in read(name).cells if cell.cell_type == "markdown"

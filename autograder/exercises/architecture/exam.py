@@ -319,8 +319,8 @@ def jobs_divided(design: ObservedDesign) -> None:
 
 
 @EXAM.check(
-    needs=("design_runs",),
-    builds_on=("navigation_action", "motors_driven"),
+    needs=("motors_driven",),  # of two that command the motors, either may have passed it on
+    builds_on=("navigation_action",),
     hints=(
         "Follow the goal from navigate_to from node to node: which one does not pass it on?",
         "Each link on the way must carry data: a message without a number or a text cannot.",
@@ -334,7 +334,6 @@ def goal_reaches_motors(design: ObservedDesign) -> None:
     This is the dye test: each node passes on marked messages, and the mark of a goal has to arrive
     at the motors. Lines on a drawing carry nothing; links do.
     """
-    require_commands(Jobs(design.graph))
     if (goals := design.goals(ACTION)) is None:
         raise Failed(
             expected=f"A goal of {ACTION} can bear a mark: it holds a number or a text.",
@@ -369,8 +368,7 @@ def require_plans(design: ObservedDesign) -> None:
 
 
 @EXAM.check(
-    needs=("obstacle_information",),
-    builds_on=("motors_driven",),
+    needs=("obstacle_information", "motors_driven"),
     hints=(
         "Follow a scan from /scan to the obstacle information, and from there to the motors.",
         "Somewhere a node reads and does not write, or a message has no room for what it says.",
@@ -384,9 +382,7 @@ def scan_reaches_motors(design: ObservedDesign) -> None:
 
     The second dye test: a scan that never gets to the motors is an obstacle that the robot hits.
     """
-    jobs = Jobs(design.graph)
-    require_commands(jobs)
-    every = jobs.obstacle_topics
+    every = Jobs(design.graph).obstacle_topics
     topics = [topic for topic in every if is_installed(topic.types)]
     if not topics:
         raise Failed(
@@ -397,7 +393,7 @@ def scan_reaches_motors(design: ObservedDesign) -> None:
     require_stream(design, follow_scan(design, topics))
     now = design.read_again()
     faults = find_link_faults(now.added_since(design.graph), OUTSIDE)
-    if len(now.topic(MOTORS).written_by) > max(1, len(jobs.controllers)):
+    if len(now.topic(MOTORS).written_by) > 1:
         faults.insert(0, why_no_driving(Jobs(now)))
     if faults:
         raise Failed(

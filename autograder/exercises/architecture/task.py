@@ -15,32 +15,34 @@
 #
 # ![A robot drives to a waypoint around a shelf; above it six jobs are joined by arrows, from the sensors to the motors.](architecture.svg)
 #
-# The delivery robot gets a waypoint and drives there, around whatever stands in its way. **You**
-# decide which nodes it has and what connects them: topic, service or action. You declare the design,
-# and the course brings it up as real ROS 2 nodes. This takes about 60 minutes.
+# **You** declare the nodes that drive the robot to a waypoint, around obstacles. This takes about 60
+# minutes.
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-must-do", "locked": true, "schema_version": 3, "solution": false}
 # ## What it must do
 #
 # - **Drivers** publish `scan`, `camera/image` and `wheel/odometry`.
 # - **State estimation** reads a sensor and publishes the robot's pose.
-# - **Obstacle detection** reads `scan` or `camera/image` and publishes what is in the way. That
-#   reaches the motors as a stream: nobody has to ask for it.
+# - **Obstacle detection** reads `scan` or `camera/image`, and publishes what is in the way. That gets
+#   to the motors unasked.
 # - **Path planning** is a service. Its node knows the `map`, and a node that has the goal calls it.
 # - **Navigation** is the server of the action `navigate_to`, and topics tell it what the sensors see.
 # - **Control**: exactly one node publishes `motors/command`, and navigation leads to it.
 #
-# A node does at most **two** of these six jobs; further nodes are welcome. And nothing dangles: each
-# topic has a writer and a reader, each service and action a server, and QoS fits.
+# A node does at most **two** of these jobs; further nodes are welcome. Nothing dangles: each topic
+# has a writer and a reader, each service and action a server, and QoS fits.
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-try-it", "locked": true, "schema_version": 3, "solution": false}
 # ## Try it
 #
-# Once the cells below have run, you can see your design at work.
+# Once the cells below have run, in a cell of your own:
 #
-# **Look inside**, in cells of your own after `import course`: `design.run()` brings its nodes up, as
-# the examiner does; `course.session().graph()` draws them from the ROS graph, with what is not
-# connected in red; and `course.session().diagnose()` says in words what is wrong.
+# ```python
+# world = course.world("warehouse"); world.add_obstacle(6.4, 1.3, 0.25); display(world)
+# design.drive(world, to="dock")   # it says what your nodes cannot do
+# ```
+#
+# `course.session().graph()` draws the nodes, and `course.session().diagnose()` finds faults.
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-fine-print", "locked": true, "schema_version": 3, "solution": false}
 # <details><summary>What exactly is examined</summary>
@@ -191,7 +193,7 @@ except InterfaceError:  # no compiler here: an installed action stands in
 #
 # `qos` is a `QoSProfile` or a depth, and can be left out (reliable, volatile, the last 10).
 # `print(design)` lists the design and what is worth another look; `design.run()` brings it up in this
-# notebook. If you prefer plain data, see `help(course.Design.from_data)`, and if you would rather
+# notebook as the examiner does: its nodes only pass marks on. `design.drive(...)` lets them work. If you prefer plain data, see `help(course.Design.from_data)`, and if you would rather
 # write a node yourself, `help(course.Design.node)`.
 #
 # ## Your design

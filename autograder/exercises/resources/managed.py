@@ -86,11 +86,12 @@ class ManagedCamera(ObservedCamera):
 
     def require_callbacks_ended(self, when: str) -> None:
         """Fail if a callback goes on and raises, as one does that still wants pictures."""
+        before = self.rig.subject.own_errors()
         self.rig.advance(TICK_S)
-        if note := self.rig.error_note():
+        if new := [e for e, n in self.rig.subject.own_errors().items() if n > before.get(e, 0)]:
             raise Failed(
                 expected=f"{when} no callback of the node's goes on.",
-                actual=f"One went on{note}.",
+                actual=f"One went on, and raised: {new[0].rstrip('.')}.",
             )
 
     def require_still_held(self) -> None:

@@ -26,8 +26,10 @@ class Outside(Protocol):
     """Whether the network is the submission's alone, so that it may lose packets."""
     delay: RunDelay
     """For how long others have kept the subject from running."""
+    usual_patience: float
+    """Share of what grading takes as patience for what may never come."""
     patience: float
-    """Share of the usual patience for what may never come; below 1 where it hardly will."""
+    """Share of the usual patience: below 1 where it hardly will come."""
 
     def ask(self, what: str, **given: Any) -> Any:
         """Return the answer to a request, as JSON knows it.
@@ -43,6 +45,7 @@ class Here:
     """Answers in this process, about another one: the kernel of a student's own."""
 
     own_network = False
+    usual_patience = 0.5  # in a notebook a second look costs a student nothing, and waiting does
     patience = 1.0
 
     def __init__(self, pid: int) -> None:
@@ -61,7 +64,7 @@ class Afar:
     """Has a warden answer, over a channel."""
 
     own_network = True
-    patience = 1.0
+    usual_patience = patience = 1.0
 
     def __init__(self, connection: socket.socket) -> None:
         """Take ownership of the connection to it."""

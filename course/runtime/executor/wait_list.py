@@ -45,6 +45,10 @@ SELDOM_S = 0.05
 """Seconds between two waits for profiles or types that do not fit, which is for people to read, and
 for requests that concern parameters."""
 
+ASKED_S = 0.5
+"""Seconds for which each wait is for all, once somebody has asked about parameters: who sets one
+asks several times in a row, and would wait that long each time."""
+
 _NEWS = (
     QoSPublisherEventType.RCL_PUBLISHER_OFFERED_INCOMPATIBLE_QOS,
     QoSPublisherEventType.RCL_PUBLISHER_INCOMPATIBLE_TYPE,
@@ -105,7 +109,7 @@ class WaitList:
         self._nodes: Sequence[Node] = ()
         self._groups: dict[CallbackGroup, Any] = {}  # with one entity of each
         self._all = self._often = _Wait((), ())
-        self._seldom_due = 0.0
+        self._seldom_due = self._asked_until = 0.0
 
     def ready_tasks(
         self, timeout: float | None, nodes: Sequence[Node] | None, condition: Callable[[], bool]
@@ -202,7 +206,11 @@ class WaitList:
             wait.misses = wait.misses or self._all.misses
             ready = [] if wait.misses else wait.wait_for_ready(self._executor, timeout)
         if wait is not self._often:
-            self._seldom_due = time.monotonic() + SELDOM_S
+            now = time.monotonic()
+            if any(each.kind == "service" and _is_seldom(each) for each in ready):
+                self._asked_until = now + ASKED_S
+            if now >= self._asked_until:
+                self._seldom_due = now + SELDOM_S
         if wait.misses:  # something was destroyed just now
             self.changed = True
         return ready

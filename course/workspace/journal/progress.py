@@ -82,8 +82,11 @@ def handed_out(folder: Path) -> list[Path]:
     """Return the course's notebooks in a working copy, chapters first."""
     try:
         names = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
-        paths = [Path(name) for name in names if isinstance(name, str)]
-    except (OSError, ValueError, TypeError):
+        # Without a digest it comes through nbgrader's exchange, and is there once it was fetched.
+        paths = [
+            Path(name) for name, digests in names.items() if digests or (folder / name).exists()
+        ]
+    except (OSError, ValueError, TypeError, AttributeError):
         paths = []
     if not paths:  # a damaged record: look for what is there
         found = [*folder.glob("*.ipynb"), *folder.glob("*/*.ipynb")]

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
 
 from course.worlds import messages
 from course.worlds.pacing import PacedSimulation
+
+Deliver = Callable[[str, Any], None]
+"""Takes the name of a topic and what would be published on it, in the world's thread: a cable."""
 
 
 @dataclass
@@ -50,6 +54,9 @@ class Ports:
         self.catch_up = catch_up
         self._topics: dict[str, _Topic] = {}
         self._outputs: dict[str, Publisher] = {}
+        self._inputs: dict[str, Subscription] = {}
+        self._deliver: Deliver | None = None
+        self._cables: Collection[str] = ()
 
     @property
     def has_radio(self) -> bool:
@@ -71,13 +78,32 @@ class Ports:
                     entry.last = message
                     handle(message)
 
-        subscription = self.node.create_subscription(msg_type, topic, receive, 10)
-        entry = self._topics[topic] = _Topic(subscription.topic_name, msg_type, 0.0)
+        self._inputs[topic] = made = self.node.create_subscription(msg_type, topic, receive, 10)
+        entry = self._topics[topic] = _Topic(made.topic_name, msg_type, 0.0)
+
+    def hand_over(self, deliver: Deliver, cables: Collection[str]) -> None:
+        """Leave all topics to other nodes: publish and hear nothing from now on.
+
+        Args:
+            deliver: gets what would be published.
+            cables: the topics whose messages are worth making.
+        """
+        self._deliver, self._cables = deliver, cables
+        for publisher in self._outputs.values():
+            self.node.destroy_publisher(publisher)
+        self._outputs.clear()
+        for topic, subscription in self._inputs.items():
+            self.node.destroy_subscription(subscription)
+            del self._topics[topic]
+        self._inputs.clear()
 
     def publish(self, topic: str, message: Any) -> None:
         """Publish, and show, a message."""
         self._topics[topic].last = message
-        self._outputs[topic].publish(message)
+        if self._deliver is None:
+            self._outputs[topic].publish(message)
+        else:
+            self._deliver(topic, message)
 
     def publish_value(self, topic: str, value: Any) -> None:
         """Publish a message of a type that has nothing but ``data``."""
@@ -86,11 +112,13 @@ class Ports:
     def publish_if_heard(self, topic: str, make: Callable[[], Any]) -> None:
         """Publish what ``make`` returns if somebody listens; show it in any case, when asked."""
         if self.is_heard(topic):  # at 100 Hz a message that nobody gets is worth saving
-            self._outputs[topic].publish(make())
+            self.publish(topic, make())
         self._topics[topic].last = make
 
     def is_heard(self, topic: str) -> bool:
-        """Return whether somebody listens to a topic of the world's."""
+        """Return whether somebody listens to a topic of the world's, or has its cable."""
+        if self._deliver is not None:
+            return topic in self._cables
         return self._outputs[topic].get_subscription_count() > 0
 
     def describe(self) -> list[dict[str, Any]]:

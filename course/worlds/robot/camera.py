@@ -11,9 +11,9 @@ from course.worlds.ray_casting import Floats, cast_rays
 WIDTH, HEIGHT = 160, 120
 FIELD_OF_VIEW_RAD = np.pi / 3
 
-_CAMERA_HEIGHT_M = 0.4
-_FOCAL_PIXELS = WIDTH / 2 / np.tan(FIELD_OF_VIEW_RAD / 2)
-_ANGLES = -np.arctan((np.arange(WIDTH) - (WIDTH - 1) / 2) / _FOCAL_PIXELS)  # the left ones are > 0
+CAMERA_HEIGHT_M = 0.4
+FOCAL_PIXELS = WIDTH / 2 / np.tan(FIELD_OF_VIEW_RAD / 2)
+_ANGLES = -np.arctan((np.arange(WIDTH) - (WIDTH - 1) / 2) / FOCAL_PIXELS)  # the left ones are > 0
 _ROWS = np.arange(HEIGHT)[:, None]
 _HEIGHTS_M = np.array([2.5, 1.6, 1.75, 0.6])  # of a wall, a shelf, a person, an obstacle
 _COLOURS = np.array(
@@ -40,9 +40,9 @@ def render_camera(floor: Floor, x: float, y: float, yaw: float) -> NDArray[np.ui
 
 def _draw_columns(image: NDArray[np.uint8], distances: Floats, kinds: NDArray[np.intp]) -> None:
     depth = np.maximum(distances * np.cos(_ANGLES), 0.05)
-    scale = _FOCAL_PIXELS / depth
-    top = HEIGHT / 2 - scale * (_HEIGHTS_M[kinds] - _CAMERA_HEIGHT_M)
-    foot = HEIGHT / 2 + scale * _CAMERA_HEIGHT_M
+    scale = FOCAL_PIXELS / depth
+    top = HEIGHT / 2 - scale * (_HEIGHTS_M[kinds] - CAMERA_HEIGHT_M)
+    foot = HEIGHT / 2 + scale * CAMERA_HEIGHT_M
     shade = np.exp(-np.minimum(depth, 100.0) / _FADE_M)[:, None]
     colours = (_COLOURS[kinds] * (0.25 + 0.75 * shade)).astype(np.uint8)
     seen = (top <= _ROWS) & (foot > _ROWS) & np.isfinite(distances)

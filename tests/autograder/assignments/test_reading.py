@@ -29,6 +29,8 @@ def places() -> dict[str, set[str]]:
 def is_there(reference: str) -> bool:
     if any(heading.startswith(reference.replace("(", "").replace(")", "")) for heading in places()):
         return True
+    if any(reference.lower() in leads for leads in places().values()):
+        return True
     heading, _, lead = reference.partition(": ")
     return any(heading in name and lead in leads for name, leads in places().items())
 

@@ -352,15 +352,22 @@ def test_an_error_of_the_students_code_in_a_check_is_not_the_graders(
     assert check.actual == "It raised KeyError: 'x'. It happened here:\n  line 3, in tick\n"
 
 
-@pytest.mark.parametrize(("fault", "status"), [("", "passed"), ("right", "not_checked")])
+@pytest.mark.parametrize(
+    ("fault", "status"),
+    [
+        (None, "passed"),
+        (Failed(expected="left", actual="right"), "not_checked"),
+        (NotExaminable("It was not seen in time."), "not_checked"),
+    ],
+)
 def test_what_builds_on_a_check_that_failed_is_made_all_the_same_and_told_once(
-    exam: Exam[list[str]], fault: str, status: str
+    exam: Exam[list[str]], fault: Exception | None, status: str
 ) -> None:
     exam.checks["third"] = replace(exam.checks["third"], needs=(), builds_on=("second",))
 
     def fly(_rig: list[str]) -> None:
         if fault:
-            raise Failed(expected="left", actual=fault)
+            raise fault
 
     exam.checks["third"] = replace(exam.checks["third"], run=fly)
     _, second, third = checks(exam, "visible")

@@ -17,6 +17,7 @@ from course.errors import CourseError
 from course.workspace import working_copy
 from course.workspace.content import content_root
 from course.workspace.journal.journal_file import MANIFEST
+from course.workspace.journal.progress import handed_out
 
 CHAPTER, EXERCISE = Path("ch05-building-blocks.ipynb"), Path("ch05/qos-design.ipynb")
 WELCOME = Path("start-here.ipynb")
@@ -73,6 +74,17 @@ def test_a_new_copy_has_the_chapters_and_the_student_versions(root: Path, folder
     assert "# Your work goes here." in exercise
     assert "BEGIN SOLUTION" not in exercise
     assert "BEGIN HIDDEN" not in exercise
+
+
+def test_a_copy_leaves_the_assignments_to_the_exchange(root: Path, folder: Path) -> None:
+    copied = working_copy.make_copy(folder, root, assignments=False)
+    assert copied.new == CHAPTERS
+    assert not (folder / EXERCISE.parent).exists()
+    assert EXERCISE not in handed_out(folder)
+    (folder / EXERCISE).parent.mkdir()
+    (folder / EXERCISE).write_text("fetched")
+    assert working_copy.make_copy(folder, root, assignments=False).beside == {}
+    assert EXERCISE in handed_out(folder)
 
 
 def test_a_students_work_stays_as_it_is(root: Path, folder: Path) -> None:

@@ -5,7 +5,7 @@
 # told: by the time on /clock, it was taken for a present answer | could not be timed in a plain program of your nodes: A try has 1 s
 # told: by the time on /clock, the request to cancel came after 4.0 s | could not be timed in a plain program of your nodes: The goal is canceled 2 s
 # told: by the time on /clock, it took 6 | could not be timed in a plain program of your nodes: A goal of 3 m
-# score: 10
+# score: at most 10
 
 from autograder.examination.subject.server import SubjectServer
 

@@ -3,7 +3,7 @@
 # exercise: architecture
 # base: wrong-emptied
 # told: both command the motors
-# score: 8
+# score: 10
 
 from rclpy.node import Node
 from rclpy.action import ActionServer

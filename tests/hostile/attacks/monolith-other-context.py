@@ -3,7 +3,7 @@
 # exercise: architecture
 # base: wrong-emptied
 # told: Two nodes called controller command them
-# score: 7
+# score: 9
 
 from rclpy.context import Context
 from rclpy.node import Node

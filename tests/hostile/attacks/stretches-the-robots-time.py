@@ -3,7 +3,7 @@
 # exercise: patterns
 # base: right-exemplar
 # told: knows a new level within 1 s.
-# told: Whoever wants to know the position gets it in metres, at most 0.5 s old
+# told: A node that wants to know the position gets it in metres, at most 0.5 s old
 # told: A drive that is called off stops the robot within 0.5 s.
 # score: 8
 

@@ -14,7 +14,7 @@ from course.errors import WaitTimeout
 class Asleep:
     """Processes whose threads all sleep, for ever; one of them wakes up in so many s."""
 
-    patience = 1.0
+    usual_patience = patience = 1.0
 
     def __init__(self, wakes: list[float]) -> None:
         self.wakes = wakes

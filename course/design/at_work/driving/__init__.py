@@ -1,0 +1,1 @@
+"""What driving takes, without ROS: to see what is in the way, to find a way, and to steer."""

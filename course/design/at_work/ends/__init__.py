@@ -1,0 +1,1 @@
+"""The endpoints of a node at work: what it publishes, asks, and is asked to carry out."""

@@ -1,0 +1,1 @@
+"""Places, and the messages that tell them: `messages` is the door."""
