@@ -1,4 +1,4 @@
-"""A container of the image, as Docker would start it: run by runc, which needs no daemon.
+"""A container of the image, as Docker would start it: run by crun, which needs no daemon.
 
 Its user is the image's, it has Docker's capabilities and a network of its own, and either what
 Docker forbids unless it is told otherwise, or what ``.devcontainer/seccomp.json`` allows.
@@ -51,6 +51,13 @@ REFUSES_NAMESPACES: dict[str, Any] = {
 }
 """What Docker's own profile has against a sandbox."""
 
+_CRUN = (
+    "unshare", "--mount", "sh", "-c", 'mount -t tmpfs tmpfs /sys/fs/cgroup && exec "$0" "$@"',
+    "crun", "--cgroup-manager=disabled",
+)  # fmt: skip
+"""A container takes no control group; crun refuses some layouts of them all the same if it sees
+them (where version 2 is mounted beside 1, for instance)."""
+
 
 @dataclass(frozen=True)
 class Container:
@@ -67,15 +74,15 @@ class Container:
         """
         with TemporaryDirectory(prefix="container-") as bundle:
             Path(bundle, "config.json").write_text(json.dumps(self._configure(command)))
-            runc = ["runc", "--root", f"{bundle}/state"]
+            crun = [*_CRUN, "--root", f"{bundle}/state"]
             try:
                 return subprocess.run(
-                    [*runc, "run", "--bundle", bundle, Path(bundle).name],
+                    [*crun, "run", "--bundle", bundle, Path(bundle).name],
                     stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                     text=True, timeout=timeout_s, check=False,
                 )  # fmt: skip
             finally:
-                gone = [*runc, "delete", "--force", Path(bundle).name]
+                gone = [*crun, "delete", "--force", Path(bundle).name]
                 subprocess.run(gone, capture_output=True, timeout=60, check=False)
 
     def _configure(self, command: tuple[str, ...]) -> dict[str, Any]:
