@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import shlex
 import shutil
@@ -24,7 +25,7 @@ from autograder.sandbox.prefork import ZygoteError
 from autograder.sandbox.sandbox import Sandbox
 from autograder.sandbox.unsandboxed import Unsandboxed
 from course.errors import CourseError
-from course.util import executables
+from course.util import containers, executables
 
 TOOLS = {
     "bwrap": "bubblewrap", "ip": "iproute2", "prlimit": "util-linux",
@@ -194,7 +195,14 @@ def _in_the_network(box: Sandbox, script: str) -> Iterator[list[bytes]]:
 def _failure_advice(said: str) -> str:
     """Return one sentence about why bwrap failed and what helps."""
     reason = said.splitlines()[-1] if said else "it said nothing"
-    if _reads(_APPARMOR) == "1":
+    restricted = _reads(_APPARMOR) == "1"
+    if container := containers.name_container(os.environ):
+        host = f", with {PROFILE} as its host's /etc/apparmor.d/bwrap" if restricted else ""
+        return (
+            "Submissions cannot be sandboxed here because this container may not make namespaces "
+            f"({reason}): {containers.advise_grading(container)}{host}, {TRUST}."
+        )
+    if restricted:
         return (
             "Submissions cannot be sandboxed here because this system's AppArmor keeps bubblewrap "
             f"from making namespaces ({reason}): allow it with `sudo cp {PROFILE} "
@@ -206,9 +214,9 @@ def _failure_advice(said: str) -> str:
             f"turn them on with `sudo sysctl kernel.unprivileged_userns_clone=1`, {TRUST}."
         )
     return (
-        f"Submissions cannot be sandboxed here because bubblewrap fails ({reason}): start a "
-        "container with the right to make namespaces (docker run --privileged, for instance), "
-        f"{TRUST}."
+        f"Submissions cannot be sandboxed here because bubblewrap fails ({reason}): if this is a "
+        "container, start it with the right to make namespaces (docker run --privileged, for "
+        f"instance), {TRUST}."
     )
 
 

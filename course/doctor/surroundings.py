@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from course.doctor.finding import HealthFinding, make_ok, make_problem, make_warning
-
-ROOT = Path("/")
-_CONTAINER_MARKS = (".dockerenv", "run/.containerenv")
-"""Files that Docker and Podman make in each container."""
+from course.util import containers
 
 
 def examine_surroundings(
     environment: Mapping[str, str] = os.environ,
     release: str | None = None,
-    root: Path = ROOT,
+    root: Path = containers.ROOT,
     folder: Path | None = None,
+    allows_sandbox: Callable[[], bool] = containers.allows_sandbox,
 ) -> Iterator[HealthFinding]:
     """Yield what there is to say about WSL and containers; nothing on a machine of its own.
 
@@ -27,24 +25,15 @@ def examine_surroundings(
         release: the kernel's, as `platform.release` gives it.
         root: where the file system begins.
         folder: where notebooks are saved; the working folder if left out.
+        allows_sandbox: says whether submissions can be sandboxed in this container.
     """
     release = (platform.release() if release is None else release).lower()
-    container = name_container(environment, root)
+    container = containers.name_container(environment, root)
     if container:
         yield make_ok("container", describe_container(container))
+        yield _judge_grading(container, allows_sandbox())
     elif "microsoft" in release:
         yield from _examine_wsl(release, Path.cwd() if folder is None else folder)
-
-
-def name_container(environment: Mapping[str, str], root: Path = ROOT) -> str:
-    """Return what kind of container this is; empty if it is none that is known."""
-    if environment.get("CODESPACES") == "true":
-        return "Codespaces"
-    if "KUBERNETES_SERVICE_HOST" in environment:
-        return "Kubernetes"
-    if (root / _CONTAINER_MARKS[0]).exists():
-        return "Docker"
-    return "Podman" if (root / _CONTAINER_MARKS[1]).exists() else ""
 
 
 def describe_container(kind: str) -> str:
@@ -53,6 +42,18 @@ def describe_container(kind: str) -> str:
         f"this is one of {kind}, with a network of its own unless it was started with "
         "--network=host: nodes in it hear each other, and none outside. Files that are not on a "
         "volume go with it"
+    )
+
+
+def _judge_grading(container: str, allowed: bool) -> HealthFinding:
+    """Say whether submissions can be graded in a container: no student needs that."""
+    name = "grading in this container"
+    if allowed:
+        return make_ok(name, "it may make the namespaces that a sandbox takes")
+    return make_ok(
+        name,
+        "notebooks and their checks run, but no submission can be sandboxed. To grade here, "
+        f"{containers.advise_grading(container)}",
     )
 
 

@@ -35,6 +35,7 @@ from autograder.sandbox.sandbox import Sandbox
 from autograder.sandbox.sandboxed_subject import Warden
 from autograder.util import exercise_folders
 from autograder.util.state_table import StateTable
+from course.util import containers
 from tests.autograder.conftest import ASSIGNMENT, NOTEBOOK, Course
 from tests.machine import needs_sandbox
 
@@ -87,6 +88,7 @@ def test_appamor_is_named_where_it_is_the_reason(
     setting = tmp_path / "apparmor_restrict_unprivileged_userns"
     setting.write_text("1\n")
     monkeypatch.setattr(sandbox_support, "_APPARMOR", setting)
+    monkeypatch.setattr(containers, "name_container", lambda _environment: "")
     advice = sandbox_support._failure_advice("bwrap: setting up uid map: Permission denied")
     assert "AppArmor" in advice
     assert "apparmor_parser -r /etc/apparmor.d/bwrap" in advice
@@ -96,9 +98,12 @@ def test_appamor_is_named_where_it_is_the_reason(
 
 def test_a_container_without_the_right_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sandbox_support, "_reads", lambda _path: "")
-    advice = sandbox_support._failure_advice("bwrap: No permissions to create new namespace")
-    assert "No permissions to create new namespace" in advice
-    assert "docker run --privileged" in advice
+    for kind, needed in (("", "docker run --privileged"), ("Docker", "seccomp=seccomp.json")):
+        monkeypatch.setattr(containers, "name_container", lambda _environment, kind=kind: kind)
+        advice = sandbox_support._failure_advice("bwrap: No permissions to create new namespace")
+        assert "No permissions to create new namespace" in advice
+        assert needed in advice
+        assert "--trust-submissions" in advice
 
 
 def test_an_untrusted_program_never_falls_back(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -43,10 +43,32 @@ def test_a_container_is_known_by_what_it_leaves(
     if mark:
         (tmp_path / mark).parent.mkdir(exist_ok=True)
         (tmp_path / mark).touch()
-    [found] = examine_surroundings(variables, WSL2, tmp_path)
+    found, grading = examine_surroundings(variables, WSL2, tmp_path, allows_sandbox=lambda: True)
     assert (found.name, found.status) == ("container", "ok")
     assert f"one of {kind}," in found.message
     assert "--network=host" in found.message
+    assert (grading.name, grading.status) == ("grading in this container", "ok")
+
+
+@pytest.mark.parametrize(
+    ("variables", "mark", "needed"),
+    [
+        ({}, ".dockerenv", ["seccomp=seccomp.json", "systempaths=unconfined", ".devcontainer"]),
+        ({}, "run/.containerenv", ["unmask=ALL"]),
+        ({"KUBERNETES_SERVICE_HOST": "10.0.0.1"}, None, ["procMount: Unmasked"]),
+        ({"CODESPACES": "true"}, None, ["a machine of your own"]),
+    ],
+)
+def test_a_container_without_namespaces_is_told_how_to_grade(
+    variables: dict[str, str], mark: str | None, needed: list[str], tmp_path: Path
+) -> None:
+    if mark:
+        (tmp_path / mark).parent.mkdir(exist_ok=True)
+        (tmp_path / mark).touch()
+    _, grading = examine_surroundings(variables, LINUX, tmp_path, allows_sandbox=lambda: False)
+    assert grading.status == "ok", "no student needs it"
+    for word in needed:
+        assert word in grading.message
 
 
 def test_a_machine_of_its_own_is_not_worth_a_line(tmp_path: Path) -> None:
