@@ -10,6 +10,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from course.design.endpoints import DesignEndpoint
 from course.design.findings import Declared, Link, find_links
 from course.graph.shapes import MERMAID
+from course.messages.yaml_text import format_count
 
 _WORDS = {"msg": "topic", "srv": "service", "action": "action"}
 
@@ -67,7 +68,9 @@ def describe_design(design: Drawn) -> str:
     if not design.nodes:
         return "A design without nodes: begin with design.node('name')."
     connections = find_links(design.nodes.values())
-    lines = [f"A design of {len(design.nodes)} nodes and {len(connections)} links", "", "Nodes"]
+    nodes = format_count(len(design.nodes), "node")
+    links = format_count(len(connections), "link")
+    lines = [f"A design of {nodes} and {links}", "", "Nodes"]
     for node in design.nodes.values():
         lines += [f"  {line}" for line in node_lines(node)]
     lines += ["", "Links"]

@@ -10,6 +10,7 @@ from typing import Any
 from rclpy.qos import QoSProfile
 
 from course.errors import CourseError
+from course.messages.yaml_text import format_count
 from course.qos_lab import experiment_runner, link, rules
 from course.qos_lab.experiment import COUNT, SCENARIOS, Experiment, ExperimentOutcome
 from course.qos_lab.experiment_runner import ExperimentError
@@ -190,7 +191,7 @@ def _trial_data(trial: LabTrial) -> dict[str, Any]:
     assert outcome is not None
     loss = f", {experiment.loss} % loss" if outcome.lossy else ""
     said = "connected" if trial.connects else "not connected"
-    said += f", {trial.arrive} messages" if trial.arrive is not None else ""
+    said += f", {format_count(trial.arrive, 'message')}" if trial.arrive is not None else ""
     truth = "That was right." if trial.is_right else "It came out otherwise."
     if trial.is_right and trial.missed_by:
         truth += f" (The loss is random: up to {trial.margin} more or less are chance.)"

@@ -10,6 +10,7 @@ from typing import Any
 from course.errors import SessionError
 from course.messages import mcap_file
 from course.messages.mcap_file import RecordingError
+from course.messages.yaml_text import format_count
 from course.runtime.core_session import CoreSession
 from course.util import argument_checks
 from course.views.pictures.timeline_svg import draw_timeline_svg
@@ -163,7 +164,7 @@ class Timeline(LiveView):
                 lines.append(f"    newest message: {newest}")
             for node, runs in _by_node(tap.runs_since(start)).items():
                 missed = sum(count for _, count in timeline.find_drops(runs))
-                passed = f", {missed} messages passed it by" if missed else ""
+                passed = f", {format_count(missed, 'message')} passed it by" if missed else ""
                 lines.append(f"    callbacks of {node}: {len(runs)}{passed}")
         return "\n".join(lines)
 

@@ -20,7 +20,7 @@ def describe_figures(figures: Figures) -> str:
     """Return figures in words."""
     if not figures.count:
         return "nothing"
-    parts = [f"{figures.count} messages"]
+    parts = [format_count(figures.count, "message")]
     if figures.rate is not None:
         parts.append(f"{figures.rate:.1f} Hz")
     if figures.latency_p50 is not None and figures.latency_p95 is not None:

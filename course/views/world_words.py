@@ -103,7 +103,8 @@ def _describe_marks(moment: dict[str, Any]) -> str:
     if moment["path"]:
         x, y = moment["path"][-1]
         parts.append(
-            f"The planned path has {len(moment['path'])} points and ends at ({x:.1f}, {y:.1f})."
+            f"The planned path has {format_count(len(moment['path']), 'point')} and ends at "
+            f"({x:.1f}, {y:.1f})."
         )
     if moment["found"]:
         parts.append(f"Your nodes found {format_count(len(moment['found']), 'obstacle')}.")

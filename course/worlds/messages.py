@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import BatteryState, Image, Imu, LaserScan
 
 from course.messages.values import to_data
-from course.messages.yaml_text import one_line
+from course.messages.yaml_text import format_count, one_line
 from course.worlds.robot.camera import HEIGHT, WIDTH
 from course.worlds.robot.lidar import BEAMS, RANGE_MAX_M, RANGE_MIN_M
 from course.worlds.robot.motion import (
@@ -151,6 +151,6 @@ _TEXTS = {
     "String": lambda message: repr(message.data),
     "Bool": lambda message: str(message.data).lower(),
     "Float64": lambda message: f"{message.data:.2f}",
-    "Path": lambda message: f"{len(message.poses)} poses",
-    "PoseArray": lambda message: f"{len(message.poses)} obstacles",
+    "Path": lambda message: format_count(len(message.poses), "pose"),
+    "PoseArray": lambda message: format_count(len(message.poses), "obstacle"),
 }

@@ -180,9 +180,10 @@ class AttemptsFile:
         shutil.copyfile(self.path, aside)  # and not renamed: a crash here leaves both
         temporary.replace(self.path)
         self._sync_folder()
+        noun, verb = ("attempt", "is") if len(attempts) == 1 else ("attempts", "are")
         return attempts, (
             f"{self.path.name} was damaged: the original is kept as {aside.name}, and the "
-            f"{len(attempts)} attempts in it that can be read are in use."
+            f"{len(attempts)} {noun} in it that can be read {verb} in use."
         )
 
     def _free_name(self) -> Path:

@@ -109,7 +109,7 @@ class QuizView {
     this.attempt = paper.attempt;
     this.answers = {};
     this.controls = new Map();
-    this.title = make("h3", { id: `${this.id}-title`, class: "quiz-title", tabindex: "-1" }, paper.title);
+    this.title = make("h2", { id: `${this.id}-title`, class: "quiz-title", tabindex: "-1" }, paper.title);
     this.meta = make("p", { class: "quiz-meta" });
     this.alarm = make("p", { class: "quiz-alarm", role: "alert" });
     this.notice = make("p", { class: "quiz-notice", role: "status" });

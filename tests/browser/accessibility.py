@@ -7,8 +7,8 @@ from typing import Any
 from axe_playwright_python.base import AXE_SCRIPT
 from playwright.sync_api import Page
 
-GRAVE = ("serious", "critical")
-"""Impacts of axe-core's that nothing of ours may have; the others are "minor" and "moderate"."""
+GRAVE = ("moderate", "serious", "critical")
+"""Impacts of axe-core's that nothing of ours may have; what is left is "minor"."""
 
 RUN = """async ours => (await axe.run(
     {include: ours.map(selector => [selector])}, {resultTypes: ["violations"]},
@@ -16,7 +16,7 @@ RUN = """async ours => (await axe.run(
 
 
 def find_grave(page: Page, *ours: str) -> list[str]:
-    """Return what axe-core calls serious or critical: the rule, the element, and what is wrong.
+    """Return what axe-core calls moderate or worse: the rule, the element, and what is wrong.
 
     Args:
         page: the page that is shown.

@@ -1,4 +1,4 @@
-"""Axe-core finds nothing serious in a chapter, an exercise, a quiz and a feedback page.
+"""Axe-core finds nothing but trifles in a chapter, an exercise, a quiz and a feedback page.
 
 It looks for texts of too little contrast, controls without a name, roles that do not fit, and so
 on. In a notebook only texts and outputs are ours; what is around them is JupyterLab's.

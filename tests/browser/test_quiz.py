@@ -130,7 +130,7 @@ def test_no_shortcut_of_jupyterlab_leaves_a_control(sit: Sit, submitted: bool) -
             page.keyboard.press(key)
         assert (window.cells(), _modes(learner)) == before, kind
     expect(learner.root).to_have_count(1)
-    needed = {"pre", "h3", "button"} | ({"summary", "p"} if submitted else set())
+    needed = {"pre", "h2", "button"} | ({"summary", "p"} if submitted else set())
     assert needed <= kinds
     if not submitted:
         assert {"radio", "checkbox", "number", "select-one"} <= kinds

@@ -43,9 +43,9 @@
 # ```python
 # import course
 #
-# world = course.world("warehouse")        # drive it with the arrow keys
+# world = course.world("warehouse")
 # course.run(SensorConsumers)              # your consumers listen to its sensors
-# course.session().timeline("scan")        # when scans were published, received and acted on
+# course.session().panel(world, "scan")    # drive with the arrow keys; see when scans arrive
 # ```
 #
 # Press its stop, or take its radio away (`world.set_fault("radio", "gone")`), and see what arrives.

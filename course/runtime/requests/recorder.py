@@ -12,6 +12,7 @@ from rclpy.qos import QoSProfile
 
 from course.errors import WaitTimeout
 from course.messages.types import type_name
+from course.messages.yaml_text import format_count
 from course.runtime.requests.graph_queries import (
     fitting_qos,
     full_topic,
@@ -94,7 +95,8 @@ class Recorder:
         with self._probe.explaining():
             if poll_condition(lambda: self._count >= n, timeout, self._probe.pulse):
                 return self.messages
-            message = f"{self._count} of {n} messages arrived on {self.topic} in {timeout:g} s."
+            wanted = format_count(n, "message")
+            message = f"{self._count} of {wanted} arrived on {self.topic} in {timeout:g} s."
             if not self._count:
                 node = self._probe.node
                 message += f" {why_no_message(node, self.topic, self.msg_type, self.qos)}"
@@ -136,7 +138,8 @@ class Recorder:
 
     def __repr__(self) -> str:
         """Return a summary for a notebook."""
-        return f"<Recorder of {self.topic} ({type_name(self.msg_type)}): {self._count} messages>"
+        count = format_count(self._count, "message")
+        return f"<Recorder of {self.topic} ({type_name(self.msg_type)}): {count}>"
 
     def _keep_message(self, message: Any, info: dict[str, int]) -> None:
         # The publisher's stamp, not ours: a busy machine delays callbacks, not the clock.

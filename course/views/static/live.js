@@ -43,6 +43,15 @@ function fill(element, attributes, children) {
   return element;
 }
 
+/** Give a view a name that no other on the page has ("World 2"): screen readers list them by name. */
+function nameApart(root, label) {
+  const others = [...document.querySelectorAll(".rosview")].filter((other) => other !== root);
+  const taken = new Set(others.map((other) => other.getAttribute("aria-label")));
+  let name = label;
+  for (let number = 2; taken.has(name); number += 1) name = `${label} ${number}`;
+  root.setAttribute("aria-label", name);
+}
+
 /** JupyterLab's shortcuts leave a control alone only if the control itself says so. */
 function guard(root) {
   for (const element of root.querySelectorAll(FOCUSABLE)) {
@@ -97,9 +106,14 @@ function render({ model, el }) {
   const drawing = view.start(stage, control);
 
   let waiting = 0;
+  let named = false;
   let confirmed = -CONFIRM_MS;
   const draw = () => {
     waiting = 0;
+    if (!named && root.isConnected) { // not before: who is to be told apart is on the page then
+      named = true;
+      nameApart(root, view.label);
+    }
     // None yet, if the first look failed or was too large to send: the status line says why.
     const frame = model.get("frame");
     if (Object.keys(frame).length) drawing.draw({ ...model.get("fixed"), ...model.get("slow"), ...frame });

@@ -40,7 +40,7 @@ const view = {
         && (!wanted || row.join(" ").toLowerCase().includes(wanted)));
       update(rows, found);
       if (following) requestAnimationFrame(() => { box.scrollTop = box.scrollHeight; });
-      const said = `the last ${found.length} of ${frame.found} lines (${frame.total} in all)`;
+      const said = `the last ${found.length} of ${frame.found} ${frame.found === 1 ? "line" : "lines"} (${frame.total} in all)`;
       if (count.textContent !== said) count.textContent = said;
     };
     return {

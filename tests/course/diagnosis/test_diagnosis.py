@@ -309,7 +309,7 @@ def test_a_recorder_and_a_goal_say_it_too(session: Session) -> None:
     try:
         with pytest.raises(WaitTimeout, match=r"has no result.*/robot is paused"):
             goal.wait(timeout=0)
-        with pytest.raises(WaitTimeout, match=r"0 of 1 messages.*/robot is paused"):
+        with pytest.raises(WaitTimeout, match=r"0 of 1 message arrived.*/robot is paused"):
             session.record("chatter", String).wait(timeout=0)
     finally:
         robot.go.set()

@@ -125,7 +125,7 @@ def test_what_nodes_plan_and_find_is_shown_and_topics_say_what_they_carry(lab):
     moment = world.describe_moment()
     assert (moment["path"], moment["found"]) == ([[1.0, 2.0]], [[3.0, 4.0]])
     texts = {topic["name"]: topic["last"] for topic in world.topics}
-    assert texts["/plan"] == "1 poses"
+    assert texts["/plan"] == "1 pose"
     assert texts["/scan"].startswith("ahead 7.")
     assert texts["/imu/data"].endswith("rad/s")
     assert texts["/camera/image"] == ""  # nobody has asked for a picture

@@ -138,7 +138,7 @@ def test_a_damaged_file_is_kept_aside_and_its_sound_part_stays_in_use(
     assert attempts == [attempt(1)]
     assert notice == (
         "quiz-sample.attempts.jsonl was damaged: the original is kept as "
-        "quiz-sample.attempts.jsonl.corrupt-1, and the 1 attempts in it that can be read are in "
+        "quiz-sample.attempts.jsonl.corrupt-1, and the 1 attempt in it that can be read is in "
         "use."
     )
     assert (file.path.parent / asides(file)[0]).read_bytes() == damaged

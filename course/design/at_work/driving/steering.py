@@ -54,7 +54,7 @@ def steer(
     of which only the distance is known, the robot stops.
     """
     points = np.array([(p.x, p.y) for p in obstacles if not p.far_only]).reshape(-1, 2)
-    target = _part_ahead(way, LOOK_AHEAD_M)[-1]
+    target = _choose_target(way, points)
     reach = min(_CLEAR_M, math.hypot(way[-1].x, way[-1].y) + ROBOT_RADIUS_M)
     if not _is_free(_rest_of(detour), points):
         detour = ()
@@ -63,7 +63,7 @@ def steer(
             if not detour:
                 return STAND, ()
     if detour:
-        target = _part_ahead(detour, LOOK_AHEAD_M)[-1]
+        target = _choose_target(detour, points)
     heading = _bearing(target)
     gaps = [place.x for place in obstacles if place.far_only]
     room = min([_room_towards(points, 0.0, _TIGHT_M), *gaps]) - _STOP_M
@@ -83,6 +83,19 @@ def guard(asked: Command, obstacles: Sequence[Place]) -> Command:
     if abs(safe.turn - asked.turn) < 0.01:
         return Command(min(asked.speed, safe.speed), asked.turn)
     return Command(min(asked.speed, safe.speed), safe.turn)
+
+
+def _choose_target(way: Sequence[Place], points: Points) -> Place:
+    """Return the place to steer at: of those ahead, the farthest to which it is free straight on.
+
+    A robot that cuts a corner of its way stands before it in the end, its nose at what is there.
+    """
+    first, *ahead = _part_ahead(way, LOOK_AHEAD_M)
+    for place in reversed(ahead):
+        far = math.hypot(place.x, place.y)
+        if _room_towards(points, _bearing(place), _TIGHT_M) > far:
+            return place
+    return ahead[0] if ahead else first
 
 
 def _part_ahead(way: Sequence[Place], metres: float) -> Sequence[Place]:

@@ -9,10 +9,19 @@ import pytest
 from course.design.at_work.driving.memory import MEMORY_S, ObstacleMemory
 from course.design.at_work.driving.steering import SPEED_MPS, STAND, steer
 from course.design.at_work.meanings import Meaning, NodePart
-from course.design.at_work.places.place import BASE, MAP, Place
+from course.design.at_work.places.place import (
+    BASE,
+    MAP,
+    Place,
+    distance_between,
+    on_floor,
+    seen_from,
+)
 from course.design.at_work.worker import PATIENCE_S, Worker
+from course.worlds.floor_plan import ROBOT_RADIUS_M
 
 WAY = [Place(0.2 * n, 0.0) for n in range(1, 20)]
+STEP_S = 0.1
 FLOOR = {"width": 12.0, "height": 8.0, "walls": [], "shelves": []}
 
 
@@ -46,6 +55,23 @@ def test_a_detour_is_stayed_with_as_long_as_it_is_free() -> None:
     assert detour == right
     command, detour = steer(WAY, post(0.8, -0.4, 0.3), right)
     assert command.turn > 0.0
+
+
+def test_a_robot_at_a_corner_of_its_detour_drives_around_it() -> None:
+    """Steering at what lay 0.6 m on along the detour, it stood for good, its nose at the post."""
+    robot, thing = Place(6.46, 0.82, 0.66), Place(6.4, 1.3)
+    corners = [(6.38, 0.73), (6.55, 0.72), (6.68, 0.87), (6.81, 1.01), (6.95, 1.16), (7.08, 1.3)]
+    around = [Place(x, y) for x, y in corners]
+    for _ in range(60):
+        if distance_between(robot, around[-1]) < 0.3:
+            break
+        things = [seen_from(robot, place) for place in post(*thing[:2], 0.25)]
+        detour = [seen_from(robot, place) for place in around]
+        command, _ = steer(detour, things, detour)
+        ahead = on_floor(robot, Place(command.speed * STEP_S, 0.0))
+        robot = Place(ahead.x, ahead.y, robot.yaw + command.turn * STEP_S)
+        assert distance_between(robot, thing) > 0.25 + ROBOT_RADIUS_M
+    assert distance_between(robot, around[-1]) < 0.3
 
 
 def test_it_stands_where_there_is_no_way() -> None:

@@ -35,7 +35,8 @@ def lab() -> Iterator[Session]:
 def declare(**changes: Any) -> Design:
     """Return a right design.
 
-    A change is the type of ``obstacles``, the type that it ``sees``, or what it is ``without``.
+    A change is the type of ``obstacles``, the type that it ``sees``, that it ``has_both`` LIDAR and
+    camera, or what it is ``without``.
     """
     sees = changes.get("sees", LaserScan)
     kind, without = changes.get("obstacles", PoseArray), changes.get("without", ())
@@ -47,7 +48,11 @@ def declare(**changes: Any) -> Design:
     design.node("estimation").subscribes("wheel/odometry", Odometry).publishes("pose", PoseStamped)
     if sees is Image:
         design.node("camera").publishes("camera/image", Image)
+    if changes.get("has_both"):
+        design.node("camera").publishes("camera/image", Image)
     detection = design.node("detection").publishes("obstacles", kind)
+    if changes.get("has_both"):
+        detection.subscribes("camera/image", Image)
     topic = "scan" if sees is LaserScan else "camera/image"
     detection.subscribes(topic, sees, qos_profile_sensor_data)
     design.node("planner").subscribes("map", OccupancyGrid).serves("plan", GetPlan)
@@ -109,6 +114,21 @@ def test_it_drives_through_one_of_two_gaps_and_touches_nothing(
     assert trip.touched == []
     took_s = float(str(trip).split(" after ")[1].split(" s.")[0])
     assert took_s < (26.0 if sees is LaserScan else 36.0)  # 22 s if nothing stands there
+
+
+@pytest.mark.parametrize("begins_s", [10.0, 20.0, 22.0])
+def test_it_arrives_whenever_it_begins_and_wherever_people_are_then(
+    lab: Session, begins_s: float
+) -> None:
+    """People decide on which side it drives around, and how near: it stood there for good."""
+    world = lab.world("warehouse")
+    world.add_obstacle(*OBSTACLE)
+    lab.sim.advance(begins_s, step=0.05)
+    trip = declare(has_both=True).drive(world, to="dock")
+    while world.simulation.time_s < begins_s + LONGEST_S and not trip.arrived:
+        lab.sim.advance(0.5, step=0.05)
+    assert trip.arrived, trip
+    assert trip.touched == []
 
 
 def test_the_same_design_drives_the_same_way_again() -> None:
