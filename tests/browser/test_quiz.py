@@ -169,7 +169,7 @@ def test_a_screen_reader_finds_roles_names_and_states(sit: Sit) -> None:
     snapshot = learner.root.aria_snapshot().replace("- '", "- ")  # YAML's quotes
     for line in (
         "- region \"A sample & <i>more</i>\"",
-        '- heading "A sample & <i>more</i>" [level=3]',
+        '- heading "A sample & <i>more</i>" [level=2]',
         '- group "Question 1 of 5 What will this cell show? Choose one."',
         '- group "Question 2 of 5 Choose all that are right."',
         '- group "Question 3 of 5 Give a number."',

@@ -92,7 +92,7 @@ def require_none_left_out(rig: SensorRig) -> None:
 
 @dataclass(frozen=True)
 class Burst:
-    """What a consumer passed on of a burst, in order; ``is_aged`` if a reading may have got old.
+    """What a consumer handed on of a burst, in order; ``is_aged`` if a reading may have got old.
 
     ``published`` is how many of the burst the driver put on the topic.
     """
@@ -104,11 +104,11 @@ class Burst:
     """When each came in, since the first."""
 
     def draw(self) -> Timeline:
-        """Return a picture of the readings that came in, and of which were passed on."""
-        title = "What came in while the consumer was busy for a moment, and what it passed on"
+        """Return a picture of the readings that came in, and of which were handed on."""
+        title = "What came in while the consumer was busy for a moment, and what it handed on"
         ended_s = max(BURST_S, *self.times_s.values())
         label = "IMU readings that came in"
-        return handled_picture(title, label, self.kept, self.times_s, (0.0, ended_s), "passed on")
+        return handled_picture(title, label, self.kept, self.times_s, (0.0, ended_s), "handed on")
 
     @property
     def missing_count(self) -> int:
@@ -117,7 +117,7 @@ class Burst:
 
 
 def pause_for_burst(rig: SensorRig) -> Burst:
-    """Keep the consumer busy while a burst of IMU readings comes in, and see what it passes on.
+    """Keep the consumer busy while a burst of IMU readings comes in, and see what it hands on.
 
     Tried again while readings are missing that a slow machine may have let grow old, or that the
     driver has lost.
@@ -170,7 +170,7 @@ def _decision_ns(rig: SensorRig, series: str) -> int:
 
 
 def require_burst(rig: SensorRig, expected: str) -> None:
-    """Fail unless the consumer passes on every IMU reading of a short pause, once and in order."""
+    """Fail unless the consumer hands on every IMU reading of a short pause, once and in order."""
     found = rig.run_once(pause_for_burst)
     missing = found.missing_count
     if missing and found.published < BURST:
@@ -183,15 +183,15 @@ def require_burst(rig: SensorRig, expected: str) -> None:
         actual = (
             f"Of {BURST} readings that came in while it was busy "
             f"{lost_phrase(missing, oldest=oldest)}, {passed or 'none'} "
-            f"{'were' if passed > 1 else 'was'} passed on{rig.error_note()}."
+            f"{'were' if passed > 1 else 'was'} handed on{rig.error_note()}."
         )
     elif len(found.kept) > BURST:
         actual = (
-            f"It passed on {BURST} readings as {len(found.kept)}: some came out more than once, "
+            f"It handed on {BURST} readings as {len(found.kept)}: some came out more than once, "
             "and an estimator that adds them up turns too far."
         )
     elif found.kept != sorted(found.kept):
-        actual = f"It passed them on out of order: {numbers_phrase(found.kept, 'reading')}."
+        actual = f"It handed them on out of order: {numbers_phrase(found.kept, 'reading')}."
     else:
         return
     with with_picture(found.draw):

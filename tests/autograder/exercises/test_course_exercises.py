@@ -206,7 +206,9 @@ def test_it_is_built_beside_those_of_the_package_and_only_its_exam_is_handed_out
     }  # fmt: skip
     text = "\n".join(path.read_text() for path in released.rglob("*") if path.is_file())
     assert "create_timer" not in text
-    assert set(map(str, working_copy._course_files(root))) >= {f"lab1/{name}" for name in SHIPPED}
+    assert set(map(str, working_copy._course_files(root, assignments=True))) >= {
+        f"lab1/{name}" for name in SHIPPED
+    }
 
 
 def test_another_chapter_changes_nothing_of_the_others(
@@ -250,7 +252,10 @@ def test_its_picture_goes_with_its_notebook(root: Path) -> None:
     picture.write_text(PICTURE)
     assert root / "source" / "lab1" / "lamp.svg" in build(root)
     assert (make_release(root, "lab1") / "lamp.svg").read_text() == PICTURE
-    assert working_copy._course_files(root)[Path("lab1/lamp.svg")] == PICTURE.encode()
+    assert (
+        working_copy._course_files(root, assignments=True)[Path("lab1/lamp.svg")]
+        == PICTURE.encode()
+    )
 
     picture.write_text(PICTURE.replace("lamp", "bulb that is on"))
     with pytest.raises(CourseError, match=r"Not in step.*source/lab1/lamp\.svg"):

@@ -25,7 +25,7 @@ class Mistake(NamedTuple):
 MISTAKES = [
     Mistake("qos", "wrong-lidar-deep", "lidar_fresh",
             ("acted on, and too old: ", "young enough to be acted on: ")),
-    Mistake("qos", "wrong-imu-single", "imu_burst", ("not passed on: 4 (", " passed on: 1 (")),
+    Mistake("qos", "wrong-imu-single", "imu_burst", ("not handed on: 4 (", " handed on: 1 (")),
     Mistake("parameters", "wrong-half-as-often", "beats_count", ("came: ", "due, 1 each second: ")),
     Mistake("patterns", "wrong-camera-slow", "camera_streams", ("came: ", "due, 10 each second")),
     Mistake("patterns", "wrong-navigation-by-time", "navigation_drives",
