@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import pytest
 
 from course import Design
@@ -162,3 +165,30 @@ def test_the_qos_of_every_endpoint_of_a_node_is_told_at_its_arrow() -> None:
     lines = layout.draw_graph(Graph(("/a", "/x"), (Topic("/t", writers, readers, broken),))).lines
     (tip,) = (line.tip for line in lines if "offers" in line.tip.splitlines()[0])
     assert tip.splitlines()[:2] == ["/a offers RELIABLE", "/a offers BEST_EFFORT"]
+
+
+LAY_OUT = """
+import random, types
+from course.graph.layout import _find_layers
+
+source = random.Random(1)
+for _ in range(3000):
+    number = source.randint(2, 40)
+    keys = [("node", f"/n{at}") for at in range(number)]
+    half = number // 2
+    links = []
+    for _ in range(source.randint(0, 3 * half)):
+        ends = [source.choice(keys[:half]), source.choice(keys[half:])]
+        source.shuffle(ends)
+        links.append(types.SimpleNamespace(source=ends[0], target=ends[1]))
+    layers = _find_layers(keys, links)
+    assert sorted(key for layer in layers for key, _ in layer) == sorted(keys)
+"""
+
+
+def test_no_graph_takes_the_process_with_it() -> None:
+    """Of igraph, version 1.0.0 did: in another process, as a crash would end this one."""
+    done = subprocess.run(
+        [sys.executable, "-c", LAY_OUT], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
