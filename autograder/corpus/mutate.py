@@ -48,7 +48,7 @@ def mutate(exam: str, *, jobs: int = 2, say: Callable[[str], None] = lambda _lin
     Raises:
         ExamError: an unknown exercise.
         CorpusError: its list of equivalent mutations is not well formed, or the exemplar itself
-            does not pass, so that mutations of it show nothing.
+            does not pass, so that mutations of it show nothing, or the exam fails on one.
     """
     source, released = trials.make_notebooks(exercises.load_exam(exam).name)
     trust = needs_trust(say)
@@ -69,7 +69,6 @@ def mutate(exam: str, *, jobs: int = 2, say: Callable[[str], None] = lambda _lin
     result.equivalent.update({m: reasons[m.key] for _, _, m in found if m.key in reasons})
     of_case: dict[str, Mutation] = {}
     cases: list[Case] = []
-    spoilt: dict[Mutation, str] = {}
     for number, (grade_id, solution, mutation) in enumerate(found):
         if mutation not in result.equivalent:
             name = f"mutation-{number}"
@@ -82,7 +81,7 @@ def mutate(exam: str, *, jobs: int = 2, say: Callable[[str], None] = lambda _lin
         statuses = trial.check_statuses
         failed = [check for check, status in statuses.items() if status in _CAUGHT]
         if "grader_error" in statuses.values():
-            spoilt[mutation] = trial.difference
+            raise CorpusError(f"The exam of {exam} itself fails on {mutation}: {trial.difference}.")
         if failed:
             result.caught[mutation] = failed
         else:
@@ -90,8 +89,6 @@ def mutate(exam: str, *, jobs: int = 2, say: Callable[[str], None] = lambda _lin
         say(f"{'caught' if failed else 'SURVIVES'}  {mutation}")
 
     trials.run(cases, source, released, jobs=jobs, trust=trust, done=note)
-    for mutation, difference in spoilt.items():
-        raise CorpusError(f"The exam of {exam} itself fails: {difference}. It did on: {mutation}")
     places = [mutation for _, _, mutation in found]
     result.survivors.sort(key=places.index)
     return result

@@ -1,7 +1,7 @@
 """What a hub's ``hub.toml`` says, and whether this machine has what it names.
 
-`autograder new hub` copies this file beside it: it needs nothing but pydantic, which a JupyterHub
-has, so that it also runs where the course is installed in an environment of its own.
+`autograder new hub` copies this file beside it. It imports only pydantic, which a JupyterHub has,
+so that it also runs where the course is installed in an environment of its own.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class HubSettings(_Strict):
     courses: dict[Annotated[str, Field(pattern=COURSE_ID)], Course] = Field(min_length=1)
 
     @property
-    def users(self) -> set[str]:
+    def allowed_users(self) -> set[str]:
         """Return everybody who may sign in."""
         people = [*self.admins]
         for course in self.courses.values():

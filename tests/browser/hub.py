@@ -5,10 +5,8 @@ from __future__ import annotations
 import json
 import shutil
 import signal
-import socket
 import subprocess
 import sys
-import time
 import tomllib
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -23,7 +21,7 @@ from playwright.sync_api import BrowserContext
 from autograder.hub import new_hub
 from tests.people import People
 
-from .lab import until
+from .lab import free_port, until
 
 PROXY = "configurable-http-proxy"
 PASSWORD = "a password of the tests"
@@ -68,7 +66,7 @@ class Hub:
         self.people = People(folder, names, [proxy.parents[2]])
         self.people.set_passwords(PASSWORD)
         self.exchange = folder / "exchange"
-        self.port = _free_port()
+        self.port = free_port()
         self.url = f"http://127.0.0.1:{self.port}"
         self._log = folder / "hub.log"
         self.folder = new_hub.make_hub(folder / "hub", self.exchange, Path(sys.executable))
@@ -76,8 +74,8 @@ class Hub:
         with (self.folder / "jupyterhub_config.py").open("a", encoding="utf-8") as config:
             config.write(
                 f"\nc.ConfigurableHTTPProxy.command = [{str(proxy)!r}]\n"
-                f"c.ConfigurableHTTPProxy.api_url = 'http://127.0.0.1:{_free_port()}'\n"
-                f"c.JupyterHub.hub_port = {_free_port()}\n"
+                f"c.ConfigurableHTTPProxy.api_url = 'http://127.0.0.1:{free_port()}'\n"
+                f"c.JupyterHub.hub_port = {free_port()}\n"
                 # For `NotebookPage`, which runs JupyterLab's commands.
                 "c.Spawner.args = ['--LabApp.expose_app_in_browser=True']\n"
             )
@@ -137,7 +135,7 @@ class Hub:
         file = self.folder / "hub.toml"
         text = file.read_text(encoding="utf-8").replace("port = 8000", f"port = {self.port}")
         for number, (course, grader) in enumerate(GRADERS.items(), 1):
-            text = text.replace(f"port = {9000 + number}", f"port = {_free_port()}")
+            text = text.replace(f"port = {9000 + number}", f"port = {free_port()}")
             text = text.replace(f"/home/{grader}/course", str(self.course_root(course)))
             head, mark, tail = text.partition(f"[courses.{course}]")
             for group in ("instructors", "students"):
@@ -184,13 +182,11 @@ class StudentClient:
         return value
 
     def _wait_for_server(self) -> None:
-        deadline = time.monotonic() + START_TIMEOUT_S
-        while True:
+        def is_up() -> bool:
             answer = self._session.get(f"{self._hub.url}/user/{self._name}/lab", timeout=60)
-            if answer.ok and f"/user/{self._name}/" in answer.url and "spawn" not in answer.url:
-                return
-            assert time.monotonic() < deadline, f"{answer.url}\n{self._hub.log()[-4000:]}"
-            time.sleep(0.1)  # between two looks at the condition
+            return answer.ok and f"/user/{self._name}/" in answer.url and "spawn" not in answer.url
+
+        until(is_up, START_TIMEOUT_S, lambda: self._hub.log()[-4000:])
 
     def _token(self, path: str) -> str:
         found = [c.value for c in self._session.cookies if c.name == "_xsrf" and c.path == path]
@@ -200,15 +196,8 @@ class StudentClient:
 def send_signal(process: subprocess.Popen[str], number: int) -> None:
     """Send a signal to a command that `People.start` has started.
 
-    Its namespace's own process may wait beside it, and would end it without a word.
+    The process of its namespace must not get it: that would end the command at once, unfinished.
     """
     found = psutil.Process(process.pid)
     [command] = found.children() if found.name() == "bwrap" else [found]
     command.send_signal(number)
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port

@@ -42,7 +42,7 @@ class Lab:
         # Jupyter's connection files are Unix paths of at most 107 bytes: a short place of its own.
         self._runtime = tempfile.TemporaryDirectory(prefix="lab-")
         self._log = folder / "lab.log"
-        self.port = _free_port()
+        self.port = free_port()
         self.url = f"http://127.0.0.1:{self.port}"
         places = {name: folder / name for name in ("config", "data", "ipython", "home")}
         for place in (self.work, *places.values()):
@@ -142,7 +142,8 @@ def until(condition: Callable[[], bool], timeout: float, failure: Callable[[], s
         time.sleep(0.05)  # between two looks at the condition
 
 
-def _free_port() -> int:
+def free_port() -> int:
+    """Return a port of this machine that nobody listens on just now."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port: int = probe.getsockname()[1]
