@@ -27,6 +27,9 @@ class Kernel:
         self.manager = KernelManager(
             kernel_name="python3", transport="ipc", ip=str(Path(self._sockets.name, "ipc"))
         )
+        # Ended by a signal, as it is after half of this, it leaves its nodes to the other kernels:
+        # that a busy machine let it end late is not what a test is about.
+        self.manager.shutdown_wait_time = 60.0
         self.manager.start_kernel(env=environment)
         self.client = self.manager.client()
         self.client.start_channels()
