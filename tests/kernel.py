@@ -27,8 +27,8 @@ class Kernel:
         self.manager = KernelManager(
             kernel_name="python3", transport="ipc", ip=str(Path(self._sockets.name, "ipc"))
         )
-        # Ended by a signal, as it is after half of this, it leaves its nodes to the other kernels:
-        # that a busy machine let it end late is not what a test is about.
+        # After half of this time jupyter_client sends SIGTERM, and a kernel that ends by a signal
+        # leaves its nodes on the graph. On a busy machine the default of 5 s is too short.
         self.manager.shutdown_wait_time = 60.0
         self.manager.start_kernel(env=environment)
         self.client = self.manager.client()

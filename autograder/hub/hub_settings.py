@@ -1,7 +1,7 @@
 """What a hub's ``hub.toml`` says, and whether this machine has what it names.
 
-`autograder new hub` copies this file beside it. It imports only pydantic, which a JupyterHub has,
-so that it also runs where the course is installed in an environment of its own.
+`autograder new hub` copies this module into the hub's folder. Its only dependency is pydantic,
+which JupyterHub installs, so it works even if the course is installed in another environment.
 """
 
 from __future__ import annotations

@@ -196,7 +196,7 @@ class StudentClient:
 def send_signal(process: subprocess.Popen[str], number: int) -> None:
     """Send a signal to a command that `People.start` has started.
 
-    The process of its namespace must not get it: that would end the command at once, unfinished.
+    The signal goes to the command, not to bwrap around it: if bwrap ends, it kills the command.
     """
     found = psutil.Process(process.pid)
     [command] = found.children() if found.name() == "bwrap" else [found]

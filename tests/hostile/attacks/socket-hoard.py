@@ -1,7 +1,7 @@
 # title: Messages that nobody reads, which the kernel keeps, in every socket that there may be
 # told: its processes had more than 2048 files open | there were more than 1200 sockets in its network | it kept more than 4 processes busy at a time
 
-# Which bound is passed first, that on open files, on sockets or on busy processes, is chance.
+# It is chance which limit it exceeds first: open files, sockets, or busy processes.
 import os
 import socket
 
